@@ -1,0 +1,124 @@
+"""The result of a solve as one object: the hand, its motion, and what was measured of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from casadi_hands.task import Task
+
+
+@dataclass(frozen=True)
+class Link:
+    """One finger segment: a capsule along its frame's z axis, from the joint to ``(0, 0, length)``.
+
+    Attributes:
+        length: length of the capsule's axis, m.
+        radius: radius of the capsule, m.
+        axis: (3,) unit vector of the joint at the segment's start, in the parent frame. At zero angle
+            every link frame is parallel to the palm's.
+    """
+
+    length: float
+    radius: float
+    axis: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Finger:
+    """A serial finger on the palm.
+
+    Attributes:
+        name: the task's name of the finger and its contact.
+        base: (3,) position of the first joint in the palm frame, m; on the palm's surface, z = 0.
+        links: segments from the palm outwards.
+    """
+
+    name: str
+    base: tuple[float, float, float]
+    links: tuple[Link, ...]
+
+
+@dataclass(frozen=True)
+class Hand:
+    """A palm disc and its fingers; the palm's frame has its origin on the surface and z where fingers point.
+
+    Attributes:
+        palm_radius: m.
+        palm_thickness: m; the disc reaches from z = -thickness to z = 0.
+        fingers: in the order of the task's fingers.
+        joint_lower, joint_upper: limits of every joint, rad.
+        effort: torque limit of every joint, N·m.
+        velocity: speed limit of every joint, rad/s.
+        density: of links and palm, kg/m³, from which masses and inertias follow.
+    """
+
+    palm_radius: float
+    palm_thickness: float
+    fingers: tuple[Finger, ...]
+    joint_lower: float
+    joint_upper: float
+    effort: float
+    velocity: float
+    density: float
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints, in the order of the motion's angles."""
+        return tuple(f"finger{i}_joint{j}" for i, finger in enumerate(self.fingers) for j in range(len(finger.links)))
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Number of joints in the hand."""
+        return sum(len(finger.links) for finger in self.fingers)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """The arrays of ``motion.npz``: same names, shapes, units and frames (see the README)."""
+
+    time: np.ndarray
+    object_position: np.ndarray
+    object_orientation: np.ndarray
+    base_position: np.ndarray
+    base_orientation: np.ndarray
+    joint_angles: np.ndarray
+    joint_names: tuple[str, ...]
+    contact_names: tuple[str, ...]
+    contact_link: tuple[str, ...]
+    contact_active: np.ndarray
+    contact_force: np.ndarray
+    contact_point_object: np.ndarray
+    contact_point_link: np.ndarray
+    external_force: np.ndarray
+    external_torque: np.ndarray
+
+
+@dataclass(frozen=True)
+class Design:
+    """A designed hand, the motion it makes, and how it came about.
+
+    Attributes:
+        task: the task as solved, every default filled in.
+        status: ``certified``, ``feasible`` or ``failed``.
+        reason: why, in the user's terms, when not certified; else empty.
+        hand: None when no stage has designed one.
+        motion: None when no stage has computed one.
+        costs: stage -> term -> ``{"weight": w, "value": weighted value}``.
+        certificate: figure -> ``{"value": v, "limit": l, "holds": bool}``.
+        stages: one entry for each solver run.
+        seconds: wall time by stage, and ``total``.
+    """
+
+    task: Task
+    status: str
+    reason: str = ""
+    hand: Hand | None = None
+    motion: Motion | None = None
+    costs: dict[str, dict[str, dict[str, float]]] = field(default_factory=dict)
+    certificate: dict[str, dict[str, Any]] = field(default_factory=dict)
+    stages: list[dict[str, Any]] = field(default_factory=list)
+    seconds: dict[str, float] = field(default_factory=dict)
