@@ -1,0 +1,1 @@
+CASADI_VERSION: str
