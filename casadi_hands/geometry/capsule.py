@@ -1,0 +1,34 @@
+"""A capsule: all points within a radius of a segment; a sphere is a capsule of no length."""
+
+from __future__ import annotations
+
+import casadi as ca
+from casadi import SX
+
+from casadi_hands.geometry.smooth import clamp, norm
+
+
+def closest_on_segment(point: SX, start: SX, end: SX) -> SX:
+    """The point of a segment nearest to ``point``; all (3,) in one frame. A segment of no length is allowed."""
+    along = end - start
+    fraction = ca.dot(point - start, along) / (ca.sumsqr(along) + 1e-12)
+    return start + clamp(fraction, 0, 1) * along
+
+
+def project_to_capsule(point: SX, start: SX, end: SX, radius: SX) -> tuple[SX, SX, SX]:
+    """The nearest point of a capsule's surface.
+
+    Args:
+        point: (3,).
+        start: (3,) first end of the capsule's axis.
+        end: (3,) other end.
+        radius: of the capsule.
+
+    Returns:
+        The projection (3,), the outward unit normal there (3,), and the signed distance of ``point`` from
+        the surface, negative inside. All in the frame and units of the arguments.
+    """
+    from_axis = point - closest_on_segment(point, start, end)
+    distance = norm(from_axis)
+    normal = from_axis / distance
+    return point + (radius - distance) * normal, normal, distance - radius

@@ -1,0 +1,29 @@
+"""The distance between two segments, differentiable where they are parallel or cross."""
+
+from __future__ import annotations
+
+import casadi as ca
+from casadi import SX
+
+from casadi_hands.geometry.smooth import clamp, norm
+
+_TIE = 1e-4  # pulls the closest points of parallel segments to their middles, relative to the squared lengths
+_ROUNDING = 1e-4  # value of the distance of crossing segments
+
+
+def segment_distance(start: SX, end: SX, other_start: SX, other_end: SX) -> SX:
+    """Distance between two segments, all ends (3,) in one frame, in units in which segments are of order one.
+
+    The closest points solve a box-constrained quadratic in the two fractions s and t, to which
+    ``tie * ((s - 1/2)² + (t - 1/2)²)`` is added so that parallel segments have one solution; the distance is
+    rounded off at zero. Errors are below 1e-4 of the lengths.
+    """
+    along, other_along, between = end - start, other_end - other_start, start - other_start
+    length2, other_length2 = ca.sumsqr(along), ca.sumsqr(other_along)
+    tie = _TIE * (length2 + other_length2) + 1e-9
+    a, b, e = length2 + tie, ca.dot(along, other_along), other_length2 + tie
+    c, f = ca.dot(along, between) - tie / 2, ca.dot(other_along, between) + tie / 2
+    s = clamp((b * f - c * e) / (a * e - b * b), 0, 1)
+    t = clamp((b * s + f) / e, 0, 1)
+    s = clamp((b * t - c) / a, 0, 1)
+    return norm(between + s * along - t * other_along, _ROUNDING)

@@ -1,0 +1,27 @@
+"""From keyframes to samples: splines, rotations, finite differences."""
+
+from casadi_hands.motion.rotation import (
+    angle_squared,
+    angular_motion,
+    conjugate,
+    exponential,
+    multiply,
+    nearest_exponential,
+    rotation_matrix,
+)
+from casadi_hands.motion.schedule import Schedule
+from casadi_hands.motion.spline import catmull_rom, held, linear
+
+__all__ = [
+    "Schedule",
+    "angle_squared",
+    "angular_motion",
+    "catmull_rom",
+    "conjugate",
+    "exponential",
+    "held",
+    "linear",
+    "multiply",
+    "nearest_exponential",
+    "rotation_matrix",
+]

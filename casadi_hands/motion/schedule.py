@@ -1,0 +1,70 @@
+"""When things happen: goal times, keyframes between them, samples between those."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from casadi_hands.motion.spline import catmull_rom, held, linear
+
+Weights = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """The times of a motion; every goal is a keyframe and every keyframe is a sample.
+
+    Attributes:
+        keyframes: (N,) s.
+        samples: (S,) s.
+        goals: for each goal the index of its keyframe.
+        step: s, the half-width of the central differences.
+    """
+
+    keyframes: NDArray[np.float64]
+    samples: NDArray[np.float64]
+    goals: tuple[int, ...]
+    step: float
+
+    @classmethod
+    def of(cls, goal_times: Sequence[float], duration: float, between: int, step: float) -> Schedule:
+        """Put ``between`` keyframes between neighbouring goals and samples at most ``step`` seconds apart.
+
+        A motion that goes on after its last goal gets one more stretch of keyframes to its end.
+        """
+        ends = list(goal_times) + ([duration] if duration > goal_times[-1] + 1e-9 else [])
+        keyframes, samples = [ends[0]], [ends[0]]
+        for start, end in zip(ends[:-1], ends[1:], strict=True):
+            inner = np.linspace(start, end, between + 2)
+            keyframes += list(inner[1:])
+            for a, b in zip(inner[:-1], inner[1:], strict=True):
+                samples += list(np.linspace(a, b, max(1, math.ceil((b - a) / step - 1e-6)) + 1)[1:])
+        goals = tuple(i * (between + 1) for i in range(len(goal_times)))
+        return cls(np.array(keyframes), np.array(samples), goals, step)
+
+    @property
+    def keyframe_samples(self) -> NDArray[np.int64]:
+        """Index (N,) of the sample at each keyframe."""
+        return np.searchsorted(self.samples, self.keyframes - 1e-9)
+
+    @property
+    def sample_keyframes(self) -> NDArray[np.int64]:
+        """Index (S,) of the keyframe whose contact flags hold at each sample."""
+        return held(self.keyframes, self.samples)
+
+    def spline(self, offset: float = 0.0) -> Weights:
+        """Catmull–Rom weights (S, N) at the samples, ``offset`` steps later."""
+        return catmull_rom(self.keyframes, self.samples + offset * self.step)
+
+    def linear(self, offset: float = 0.0) -> Weights:
+        """Linear weights (S, N) at the samples, ``offset`` steps later."""
+        return linear(self.keyframes, self.samples + offset * self.step)
+
+    def between(self, count: int) -> NDArray[np.float64]:
+        """Times of the keyframes with ``count`` more between each pair, s."""
+        parts = [np.linspace(a, b, count + 2)[:-1] for a, b in zip(self.keyframes[:-1], self.keyframes[1:], strict=True)]
+        return np.append(np.concatenate(parts), self.keyframes[-1])

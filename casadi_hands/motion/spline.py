@@ -1,0 +1,54 @@
+"""Interpolation as constant matrices: samples = weights @ keyframes (section 2.2.1)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Weights = NDArray[np.float64]
+
+
+def _segment(knots: Weights, times: Weights) -> tuple[NDArray[np.int64], Weights]:
+    """Index of the knot interval of each time, and the fraction of it that has passed."""
+    index = np.clip(np.searchsorted(knots, times + 1e-9, side="right") - 1, 0, len(knots) - 2)
+    return index, (times - knots[index]) / (knots[index + 1] - knots[index])
+
+
+def linear(knots: ArrayLike, times: ArrayLike) -> Weights:
+    """Weights (T, N) of piecewise-linear interpolation; constant beyond the ends."""
+    knots, times = np.asarray(knots, float), np.clip(np.asarray(times, float), np.min(knots), np.max(knots))
+    index, fraction = _segment(knots, times)
+    weights = np.zeros((len(times), len(knots)))
+    rows = np.arange(len(times))
+    weights[rows, index] = 1 - fraction
+    weights[rows, index + 1] = fraction
+    return weights
+
+
+def held(knots: ArrayLike, times: ArrayLike) -> NDArray[np.int64]:
+    """Index (T,) of the knot whose value holds at each time: the last one not later than it."""
+    knots = np.asarray(knots, float)
+    return np.clip(np.searchsorted(knots, np.asarray(times, float) + 1e-9, side="right") - 1, 0, len(knots) - 1)
+
+
+def catmull_rom(knots: ArrayLike, times: ArrayLike) -> Weights:
+    """Weights (T, N) of a Catmull–Rom spline whose end points are mirrored, so that it starts and ends at rest.
+
+    The tangent at an inner knot is the slope between its neighbours. Times before the first knot and after the
+    last see the motion's mirror image, which keeps central differences at the ends consistent.
+    """
+    knots, times = np.asarray(knots, float), np.asarray(times, float).copy()
+    times = knots[0] + np.abs(times - knots[0])
+    times = knots[-1] - np.abs(knots[-1] - times)
+    index, s = _segment(knots, times)
+    count, rows = len(knots), np.arange(len(times))
+    tangents = np.zeros((count, count))
+    for i in range(1, count - 1):
+        span = knots[i + 1] - knots[i - 1]
+        tangents[i, i + 1], tangents[i, i - 1] = 1 / span, -1 / span
+    span = (knots[index + 1] - knots[index])[:, None]
+    s = s[:, None]
+    weights = (s**3 - 2 * s**2 + s) * span * tangents[index] + (s**3 - s**2) * span * tangents[index + 1]
+    weights[rows, index] += (2 * s**3 - 3 * s**2 + 1)[:, 0]
+    weights[rows, index + 1] += (3 * s**2 - 2 * s**3)[:, 0]
+    return weights

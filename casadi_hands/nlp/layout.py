@@ -1,0 +1,97 @@
+"""Where each named array stands in a long vector, and linear expressions of its entries."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sparse
+from numpy.typing import ArrayLike, NDArray
+
+Vector = NDArray[np.float64]
+
+
+class Layout:
+    """Packs named arrays into one vector and unpacks it; the only place that knows positions."""
+
+    def __init__(self) -> None:
+        self._indices: dict[str, NDArray[np.int64]] = {}
+        self.size = 0
+
+    def add(self, name: str, shape: tuple[int, ...]) -> NDArray[np.int64]:
+        """Reserve room for an array and return the positions of its entries, in its shape."""
+        if name in self._indices:
+            raise KeyError(f"'{name}' is already in the layout")
+        count = int(np.prod(shape))
+        self._indices[name] = np.arange(self.size, self.size + count).reshape(shape)
+        self.size += count
+        return self._indices[name]
+
+    def __getitem__(self, name: str) -> NDArray[np.int64]:
+        return self._indices[name]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._indices
+
+    def names(self) -> list[str]:
+        """Names in the order of the vector."""
+        return list(self._indices)
+
+    def pack(self, values: Mapping[str, ArrayLike], into: Vector) -> Vector:
+        """A copy of ``into`` with the named arrays written over it; each value may be broadcast to its shape.
+
+        Raises:
+            KeyError: a name that is not in the layout.
+        """
+        packed = into.copy()
+        for name, value in values.items():
+            if name not in self._indices:
+                raise KeyError(f"'{name}' is not one of {', '.join(self._indices)}")
+            packed[self._indices[name]] = np.asarray(value, float)
+        return packed
+
+    def unpack(self, vector: Vector) -> dict[str, Vector]:
+        """The named arrays of a vector, as copies."""
+        return {name: vector[index] for name, index in self._indices.items()}
+
+
+class Rows:
+    """K rows of d linear expressions of the variables: what a kernel's instances read.
+
+    ``matrix`` has K·d rows and one column a variable (columns may be added later); row ``k*d + i`` is entry i of
+    instance k.
+    """
+
+    def __init__(self, matrix: Any, count: int) -> None:
+        self.matrix = sparse.csr_array(matrix)
+        self.count = count
+        self.width = self.matrix.shape[0] // count if count else 0
+
+    @classmethod
+    def of(cls, indices: NDArray[np.int64], size: int) -> Rows:
+        """Rows that read the variables at ``indices`` (K, d) of a vector of ``size``."""
+        flat = indices.reshape(-1)
+        matrix = sparse.csr_array((np.ones(flat.size), (np.arange(flat.size), flat)), shape=(flat.size, size))
+        return cls(matrix, indices.shape[0])
+
+    def combine(self, weights: ArrayLike) -> Rows:
+        """Rows (T, d) that are the linear combinations ``weights`` (T, K) of these."""
+        weights = np.asarray(weights, float)
+        mixed = sparse.kron(sparse.csr_array(weights), sparse.eye_array(self.width)) @ self.matrix
+        return Rows(mixed, weights.shape[0])
+
+    def take(self, indices: ArrayLike) -> Rows:
+        """The rows of the given instances, in that order, repeats allowed."""
+        picked = np.asarray(indices, int)
+        rows = (picked[:, None] * self.width + np.arange(self.width)).reshape(-1)
+        return Rows(self.matrix[rows], len(picked))
+
+    def entries(self, start: int, stop: int) -> Rows:
+        """Entries ``start`` to ``stop`` of every row."""
+        rows = (np.arange(self.count)[:, None] * self.width + np.arange(start, stop)).reshape(-1)
+        return Rows(self.matrix[rows], self.count)
+
+    def constant(self, count: int) -> Rows:
+        """One row repeated for ``count`` instances."""
+        return self.take(np.zeros(count, int))

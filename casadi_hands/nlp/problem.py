@@ -1,0 +1,198 @@
+"""A nonlinear program by name: variables, parameters, kernels bound to them, and the functions IPOPT wants."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+import scipy.sparse as sparse
+from casadi import MX, Function
+from numpy.typing import ArrayLike, NDArray
+
+from casadi_hands.nlp.assembly import gather_nonzeros, kernel_functions, scatter_hessian, scatter_jacobian, to_dm
+from casadi_hands.nlp.kernel import Kernel
+from casadi_hands.nlp.layout import Layout, Rows
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Bound:
+    """A kernel with what each of its instances reads."""
+
+    kernel: Kernel
+    terms: list[str]
+    weights: NDArray[np.int64]
+    selector: sparse.csr_array
+    parameters: NDArray[np.int64]
+    count: int
+    first_row: int
+    functions: dict[str, Function]
+
+
+class Problem:
+    """Collects variables, parameters and kernels; ``functions`` then gives f, g and their exact derivatives.
+
+    Built once for a structure and solved many times: weights, targets and bounds are parameters or bounds.
+    Declare all variables before binding kernels.
+    """
+
+    def __init__(self) -> None:
+        self.variables = Layout()
+        self.parameters = Layout()
+        self.constraints = Layout()
+        self.lower: Vector = np.empty(0)
+        self.upper: Vector = np.empty(0)
+        self.constraint_lower: Vector = np.empty(0)
+        self.constraint_upper: Vector = np.empty(0)
+        self._bound: list[_Bound] = []
+
+    def variable(self, name: str, shape: tuple[int, int], lower: ArrayLike = -np.inf, upper: ArrayLike = np.inf) -> Rows:
+        """A decision variable (K, d) with box bounds, broadcast to its shape."""
+        indices = self.variables.add(name, shape)
+        self.lower = np.append(self.lower, np.broadcast_to(np.asarray(lower, float), shape).reshape(-1))
+        self.upper = np.append(self.upper, np.broadcast_to(np.asarray(upper, float), shape).reshape(-1))
+        return Rows.of(indices, self.variables.size)
+
+    def parameter(self, name: str, shape: tuple[int, int]) -> NDArray[np.int64]:
+        """A parameter (K, d); the positions returned are bound to kernels, row k to instance k."""
+        return self.parameters.add(name, shape)
+
+    def bind(
+        self,
+        kernel: Kernel,
+        variables: Sequence[Rows],
+        parameters: Sequence[NDArray[np.int64]] = (),
+        bounds: dict[str, tuple[ArrayLike, ArrayLike]] | None = None,
+    ) -> None:
+        """Evaluate a kernel once for each row of its arguments.
+
+        Args:
+            kernel: the block.
+            variables: for each local variable the rows (K, d) it reads.
+            parameters: for each local parameter positions (K, d), or (1, d) where all instances share it.
+            bounds: lower and upper bound of each constraint, broadcast to its length in every instance.
+        """
+        count = variables[0].count
+        sizes = kernel.variable_sizes
+        for (name, size), rows in zip(sizes, variables, strict=True):
+            if rows.count != count or rows.width != size:
+                raise ValueError(f"{kernel.name}.{name}: rows ({rows.count}, {rows.width}), expected ({count}, {size})")
+        columns = self.variables.size
+        blocks = [sparse.csr_array(r.matrix.copy()) for r in variables]
+        for block in blocks:
+            block.resize((block.shape[0], columns))
+        width = sum(size for _, size in sizes)
+        order = np.argsort(_interleave([size for _, size in sizes], count), kind="stable")
+        selector = sparse.csr_array(sparse.vstack(blocks, format="csr")[order])
+        assert selector.shape[0] == width * count
+        parts = [np.broadcast_to(p, (count, p.shape[1])) for p in parameters]
+        positions = np.hstack(parts) if parts else np.zeros((count, 0), int)
+        if positions.shape[1] != kernel.parameters.numel():
+            raise ValueError(f"{kernel.name}: {positions.shape[1]} parameters, expected {kernel.parameters.numel()}")
+        terms = list(kernel.terms)
+        for term in terms:
+            if f"weight.{term}" not in self.parameters:
+                self.parameters.add(f"weight.{term}", (1,))
+        weights = np.array([self.parameters[f"weight.{term}"][0] for term in terms], int)
+        first = self.constraints.size
+        self._constrain(kernel, count, bounds or {})
+        functions = kernel_functions(kernel, terms)
+        self._bound.append(_Bound(kernel, terms, weights, selector, positions, count, first, functions))
+
+    def _constrain(self, kernel: Kernel, count: int, bounds: dict[str, tuple[ArrayLike, ArrayLike]]) -> None:
+        """Reserve the kernel's constraint rows, instance after instance, and set their bounds."""
+        sizes = {name: g.numel() for name, g in kernel.constraints.items()}
+        width = sum(sizes.values())
+        if not width:
+            return
+        self.constraints.add(kernel.name, (count, width))
+        lower, upper = np.empty((count, width)), np.empty((count, width))
+        start = 0
+        for name, size in sizes.items():
+            lower[:, start : start + size], upper[:, start : start + size] = bounds[name]
+            start += size
+        self.constraint_lower = np.append(self.constraint_lower, lower.reshape(-1))
+        self.constraint_upper = np.append(self.constraint_upper, upper.reshape(-1))
+
+    @property
+    def terms(self) -> list[str]:
+        """Names of all cost terms."""
+        return list(dict.fromkeys(term for bound in self._bound for term in bound.terms))
+
+    def functions(self) -> dict[str, Function]:
+        """Functions ``nlp`` (x, p) -> (f, g), ``grad_f``, ``jac_g``, ``hess_lag`` for nlpsol, and ``terms``."""
+        x, p = MX.sym("x", self.variables.size), MX.sym("p", self.parameters.size)
+        scale, multipliers = MX.sym("lam_f"), MX.sym("lam_g", self.constraints.size)
+        inputs = [self._inputs(bound, x, p) for bound in self._bound]
+        values = [b.functions["value"].map(b.count)(*i) for b, i in zip(self._bound, inputs, strict=True)]
+        gradients = [b.functions["gradient"].map(b.count)(*i) for b, i in zip(self._bound, inputs, strict=True)]
+        f = sum((ca.sum2(total) for total, _ in gradients), MX(0))
+        g = ca.vertcat(*[ca.vec(v[1]) for v in values if v[1].numel()]) if self.constraints.size else MX.zeros(0, 1)
+        gradient = sum(
+            (ca.mtimes(MX(to_dm(b.selector.T)), ca.vec(v[1])) for b, v in zip(self._bound, gradients, strict=True)),
+            MX.zeros(x.numel(), 1),
+        )
+        terms = self._term_values(values, p)
+        return {
+            "nlp": Function("nlp", [x, p], [f, g], ["x", "p"], ["f", "g"]),
+            "grad_f": Function("nlp_grad_f", [x, p], [f, gradient], ["x", "p"], ["f", "grad_f_x"]),
+            "jac_g": Function("nlp_jac_g", [x, p], [g, self._jacobian(inputs)], ["x", "p"], ["g", "jac_g_x"]),
+            "hess_lag": Function(
+                "nlp_hess_l",
+                [x, p, scale, multipliers],
+                [self._hessian(inputs, scale, multipliers)],
+                ["x", "p", "lam_f", "lam_g"],
+                ["triu_hess_gamma_x_x"],
+            ),
+            "terms": Function("terms", [x, p], [terms], ["x", "p"], ["terms"]),
+        }
+
+    def _inputs(self, bound: _Bound, x: MX, p: MX) -> tuple[MX, MX, MX]:
+        local = ca.reshape(ca.mtimes(MX(to_dm(bound.selector)), x), -1, bound.count)
+        positions = bound.parameters.reshape(-1).tolist()
+        parameters = ca.reshape(p[positions], -1, bound.count) if positions else MX.zeros(0, bound.count)
+        weights = ca.repmat(p[bound.weights.tolist()], 1, bound.count) if bound.terms else MX.zeros(0, bound.count)
+        return local, parameters, weights
+
+    def _term_values(self, values: list[tuple[MX, MX]], p: MX) -> MX:
+        """Weighted total of each term, in the order of ``terms``."""
+        totals = dict.fromkeys(self.terms, MX(0))
+        for bound, (terms, _) in zip(self._bound, values, strict=True):
+            sums = ca.sum2(terms)
+            for i, name in enumerate(bound.terms):
+                totals[name] = totals[name] + p[int(bound.weights[i])] * sums[i]
+        return ca.vertcat(*totals.values())
+
+    def _jacobian(self, inputs: list[tuple[MX, MX, MX]]) -> MX:
+        parts, sources = [], []
+        for bound, arguments in zip(self._bound, inputs, strict=True):
+            pattern = bound.functions["jacobian_pattern"].sparsity_out(0)
+            if pattern.nnz():
+                parts.append(scatter_jacobian(bound.selector, bound.count, pattern, bound.first_row))
+                sources.append(ca.vec(bound.functions["jacobian"].map(bound.count)(*arguments)[1]))
+        return gather_nonzeros((self.constraints.size, self.variables.size), parts, sources)
+
+    def _hessian(self, inputs: list[tuple[MX, MX, MX]], scale: MX, multipliers: MX) -> MX:
+        parts, sources = [], []
+        for bound, arguments in zip(self._bound, inputs, strict=True):
+            pattern = bound.functions["hessian_pattern"].sparsity_out(0)
+            if pattern.nnz():
+                width = bound.functions["jacobian_pattern"].size1_out(0)
+                local = multipliers[bound.first_row : bound.first_row + width * bound.count]
+                local = ca.reshape(local, width, bound.count) if width else MX.zeros(0, bound.count)
+                scales = ca.repmat(scale, 1, bound.count)
+                parts.append(scatter_hessian(bound.selector, bound.count, pattern))
+                sources.append(ca.vec(bound.functions["hessian"].map(bound.count)(*arguments, scales, local)))
+        return gather_nonzeros((self.variables.size, self.variables.size), parts, sources)
+
+
+def _interleave(sizes: list[int], count: int) -> NDArray[np.int64]:
+    """Sort keys that bring stacked blocks (each count·size rows) into the order instance, block, entry."""
+    width, keys, start = sum(sizes), [], 0
+    for size in sizes:
+        keys.append((np.arange(count)[:, None] * width + start + np.arange(size)).reshape(-1))
+        start += size
+    return np.concatenate(keys)

@@ -1,0 +1,148 @@
+"""IPOPT on a problem's functions, with results by name."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from casadi_hands.nlp.problem import Problem
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Options:
+    """IPOPT's settings that the stages differ in; limits are iterations, never seconds.
+
+    The defaults are the loose tolerances that the soft stages need and no more.
+    """
+
+    max_iter: int = 150
+    tol: float = 1e-3
+    acceptable_tol: float = 1e-2
+    constr_viol_tol: float = 1e-4
+    mu_init: float = 1e-1
+    extra: tuple[tuple[str, Any], ...] = ()
+
+    def ipopt(self) -> dict[str, Any]:
+        """The options as IPOPT names them."""
+        named = {name: getattr(self, name) for name in ("max_iter", "tol", "acceptable_tol", "constr_viol_tol", "mu_init")}
+        return {"print_level": 0, "sb": "yes", **named, **dict(self.extra)}
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What one solve returned, by name; a solve that stopped early is a value too.
+
+    Attributes:
+        values: variable -> array.
+        terms: cost term -> weighted value.
+        objective: sum of the terms.
+        violation: largest violation of a constraint.
+        status: IPOPT's own words; never taken as proof.
+        iterations: number of iterations.
+        seconds: wall time.
+        multipliers: of bounds and constraints, to warm-start the next solve.
+    """
+
+    values: dict[str, Vector]
+    terms: dict[str, float]
+    objective: float
+    violation: float
+    status: str
+    iterations: int
+    seconds: float
+    multipliers: dict[str, Vector] = field(repr=False, default_factory=dict)
+
+
+class Solver:
+    """A problem with its functions built, ready to be solved from any start with any parameters."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.functions = problem.functions()
+        self._solvers: dict[Options, ca.Function] = {}
+
+    def _solver(self, options: Options) -> ca.Function:
+        if options not in self._solvers:
+            f = self.functions
+            settings = {
+                "ipopt": options.ipopt(),
+                "print_time": False,
+                "error_on_fail": False,
+                "show_eval_warnings": False,
+                "grad_f": f["grad_f"],
+                "jac_g": f["jac_g"],
+                "hess_lag": f["hess_lag"],
+            }
+            self._solvers[options] = ca.nlpsol("solver", "ipopt", f["nlp"], settings)
+        return self._solvers[options]
+
+    def solve(
+        self,
+        start: Mapping[str, ArrayLike],
+        parameters: Mapping[str, ArrayLike],
+        options: Options | None = None,
+        lower: Mapping[str, ArrayLike] | None = None,
+        upper: Mapping[str, ArrayLike] | None = None,
+        warm: Solution | None = None,
+    ) -> Solution:
+        """Solve from ``start``.
+
+        Args:
+            start: variable -> initial value; variables left out start at zero, within their bounds.
+            parameters: parameter -> value, all of them; weights as ``weight.<term>``.
+            options: IPOPT's settings.
+            lower: variable -> lower bound, where it differs from the declared one.
+            upper: variable -> upper bound, where it differs.
+            warm: an earlier solution whose multipliers are the start's.
+
+        Raises:
+            KeyError: a name that is not in the problem, or a parameter left out.
+        """
+        problem = self.problem
+        missing = [name for name in problem.parameters.names() if name not in parameters]
+        if missing:
+            raise KeyError(f"parameters without a value: {', '.join(missing)}")
+        solver = self._solver(options or Options())
+        lbx = problem.variables.pack(lower or {}, problem.lower)
+        ubx = problem.variables.pack(upper or {}, problem.upper)
+        x0 = np.clip(problem.variables.pack(start, np.zeros(problem.variables.size)), lbx, ubx)
+        p = problem.parameters.pack(parameters, np.zeros(problem.parameters.size))
+        arguments: dict[str, Any] = {"x0": x0, "p": p, "lbx": lbx, "ubx": ubx}
+        arguments |= {"lbg": problem.constraint_lower, "ubg": problem.constraint_upper}
+        if warm is not None and warm.multipliers:
+            arguments |= {"lam_x0": warm.multipliers["x"], "lam_g0": warm.multipliers["g"]}
+        started = time.perf_counter()
+        answer = solver(**arguments)
+        seconds = time.perf_counter() - started
+        return self._solution(answer, p, solver.stats(), seconds)
+
+    def evaluate(self, values: Mapping[str, ArrayLike], parameters: Mapping[str, ArrayLike]) -> dict[str, float]:
+        """The weighted value of every term at given variables."""
+        x = self.problem.variables.pack(values, np.zeros(self.problem.variables.size))
+        p = self.problem.parameters.pack(parameters, np.zeros(self.problem.parameters.size))
+        terms = np.asarray(self.functions["terms"](x, p)).reshape(-1)
+        return dict(zip(self.problem.terms, terms.tolist(), strict=True))
+
+    def _solution(self, answer: dict[str, Any], p: Vector, stats: dict[str, Any], seconds: float) -> Solution:
+        problem = self.problem
+        x, g = (np.asarray(answer[name]).reshape(-1) for name in ("x", "g"))
+        beyond = np.maximum(problem.constraint_lower - g, g - problem.constraint_upper)
+        terms = np.asarray(self.functions["terms"](x, p)).reshape(-1)
+        return Solution(
+            values=problem.variables.unpack(x),
+            terms=dict(zip(problem.terms, terms.tolist(), strict=True)),
+            objective=float(answer["f"]),
+            violation=float(max(beyond.max(initial=0.0), 0.0)),
+            status=str(stats["return_status"]),
+            iterations=int(stats["iter_count"]),
+            seconds=seconds,
+            multipliers={name: np.asarray(answer[f"lam_{name}"]).reshape(-1) for name in ("x", "g")},
+        )
