@@ -15,8 +15,8 @@ def finger_kinematics(joints: int) -> casadi.Function:
     """Build the kinematics of a serial finger with its morphology as symbols.
 
     Joint 0 sits at ``base``, joint j + 1 at ``(0, 0, lengths[j])`` in link j's frame, the tip at
-    ``(0, 0, lengths[-1])`` in the last. At zero angles every link frame is parallel to the palm's. Everything is
-    linear in the lengths, so any unit of length may go in; the same comes out.
+    ``(0, 0, lengths[-1])`` in the last. At zero angles every link frame is parallel to the palm's. Any unit of
+    length may go in, in place of the m below; the same comes out.
 
     The function is an SX function named ``finger_kinematics_{joints}``; called with SX it expands in place.
 
