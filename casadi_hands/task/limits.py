@@ -1,0 +1,38 @@
+"""The limits a design must keep to be certified."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from casadi_hands.task.fields import NonNegative, Section
+
+
+class Limits(Section):
+    """Limits of the certificate; weight means mass times gravity (9.81 m/s² where gravity is off)."""
+
+    goal_position: NonNegative = Field(default=0.0005, description="Distance of object (or tool) and goal, m.")
+    goal_angle: NonNegative = Field(default=0.5, description="Angle between object and goal, degrees.")
+    residual: NonNegative = Field(
+        default=1e-6,
+        description="Newton-Euler residual at the motion's knots: force over weight, torque over weight × half extent.",
+    )
+    residual_between: NonNegative = Field(default=1e-3, description="The same between knots.")
+    friction_excess: NonNegative = Field(
+        default=0.0, description="Tangential force beyond friction × normal force, on either surface, over weight."
+    )
+    pull: NonNegative = Field(default=0.0, description="Normal force by which a contact would have to suck, over weight.")
+    penetration: NonNegative = Field(default=0.0001, description="Depth by which two bodies overlap, m.")
+    gap: NonNegative = Field(default=0.00005, description="Distance of an active contact's surfaces at samples, m.")
+    gap_between: NonNegative = Field(default=0.0001, description="The same between samples, m.")
+    slip: NonNegative = Field(default=0.0002, description="Slip of a contact from touch to lift, m.")
+    unsupplied_force: NonNegative = Field(
+        default=0.02, description="Contact force that the joints cannot supply actively, over weight."
+    )
+    joint_limit: NonNegative = Field(default=0.001, description="Angle beyond a joint's limit, degrees.")
+    speed: NonNegative = Field(default=1.0, description="Joint speed as a share of the actuator's, if one is named.")
+    torque: NonNegative = Field(default=1.0, description="Joint torque as a share of the actuator's, if one is named.")
+    disturbance_radius: NonNegative = Field(
+        default=0.0,
+        description="Least size of the smallest wrench the grasp cannot resist, over weight. 0 asks for none: two "
+        "point contacts can never resist a spin about the line through them.",
+    )

@@ -1,0 +1,85 @@
+"""Pydantic's errors in the user's words."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from pydantic_core import ErrorDetails
+
+from casadi_hands.task.problem import Problem
+from casadi_hands.task.structure import names_at, paths_of
+
+_ALLOWED = {
+    "float_type": "a number (without quotes or unit; lengths in m, times in s, masses in kg)",
+    "finite_number": "a finite number",
+    "greater_than": "a number greater than {gt:g}",
+    "greater_than_equal": "a number of at least {ge:g}",
+    "less_than": "a number less than {lt:g}",
+    "less_than_equal": "a number of at most {le:g}",
+    "int_type": "a whole number",
+    "bool_type": "true or false",
+    "string_type": "text",
+    "string_too_short": "text that is not empty",
+    "tuple_type": "a list",
+    "model_type": "a mapping with the fields {names}",
+    "dict_type": "a mapping of names, such as thumb: {{touches: [0, 0.02, 0]}}",
+    "union_tag_invalid": "sphere: {{center, radius}} or capsule: {{start, end, radius}}",
+    "union_tag_not_found": "sphere: {{center, radius}} or capsule: {{start, end, radius}}",
+    "refused": "{allowed}",
+}
+
+
+def explain(errors: Iterable[ErrorDetails], data: Mapping[str, Any]) -> list[Problem]:
+    """Translate what pydantic found.
+
+    Args:
+        errors: its error list.
+        data: the content of the task file, to tell what else was written beside the wrong field.
+    """
+    errors = [error for error in errors if error["type"] != "default_factory_not_called"]
+    unknown = [_unknown(error["loc"]) for error in errors if error["type"] == "extra_forbidden"]
+    meant = {problem.path[:-1] + (guess,) for problem, guess in unknown if guess}
+    # A misspelt field is reported once: as unknown, not as missing too.
+    known = [error for error in errors if error["type"] != "extra_forbidden" and error["loc"] not in meant]
+    return [problem for problem, _ in unknown] + [_known(error) for error in known]
+
+
+def _known(error: ErrorDetails) -> Problem:
+    path, kind, given = error["loc"], error["type"], _show(error["input"])
+    context = {**error.get("ctx", {}), "names": ", ".join(names_at(path))}
+    if kind == "missing":
+        return Problem(path, "nothing", f"required: {_description(path)}")
+    if kind in ("too_short", "too_long"):
+        count = error["ctx"].get("min_length", error["ctx"].get("max_length"))
+        return Problem(path, given, f"{'at least' if kind == 'too_short' else 'at most'} {count} of them")
+    return Problem(path, given, _ALLOWED[kind].format(**context) if kind in _ALLOWED else error["msg"])
+
+
+def _unknown(path: tuple[str | int, ...]) -> tuple[Problem, str | None]:
+    """The problem of a field that does not exist, and the name that was likely meant."""
+    name, section = str(path[-1]), names_at(path[:-1])
+    near = difflib.get_close_matches(name, section, n=1, cutoff=0.6)
+    if near:
+        return Problem(path, "an unknown field", f"{', '.join(section)}; did you mean {near[0]}?"), near[0]
+    elsewhere = paths_of(name)
+    hint = f"; did you mean {' or '.join(elsewhere)}?" if elsewhere else ""
+    return Problem(path, "an unknown field", f"{', '.join(section)}{hint}"), None
+
+
+def _description(path: tuple[str | int, ...]) -> str:
+    from casadi_hands.task.structure import description_at
+
+    return description_at(path)
+
+
+def _show(value: Any) -> str:
+    if value is None:
+        return "nothing"
+    if isinstance(value, dict):
+        return "a mapping" + (f" of {', '.join(map(str, value))}" if value else " without fields")
+    if isinstance(value, list | tuple | str | int | float | bool):
+        text = repr(value) if not isinstance(value, bool) else str(value).lower()
+        return text if len(text) <= 60 else f"{text[:57]}..."
+    return type(value).__name__

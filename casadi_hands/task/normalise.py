@@ -1,0 +1,100 @@
+"""A checked task brought to the form the program works on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from casadi_hands.task.fields import Vector
+from casadi_hands.task.motion import Goal
+from casadi_hands.task.object import ManipulatedObject
+from casadi_hands.task.problem import Problem
+from casadi_hands.task.task import Task
+
+# Share of the half extent within which a contact is moved onto the surface without a word.
+CONTACT_TOLERANCE = 0.2
+# Lengths below this share of the half extent are rounding: nothing is moved for them, so that normalising a task
+# twice, or saving and loading it, leaves it equal to the last digit.
+_ROUNDING = 1e-12
+
+
+def normalise(task: Task) -> tuple[Task, list[Problem]]:
+    """Move contacts onto the object's surface and the object frame to the centre of mass.
+
+    Returns:
+        The task, and what is wrong with its contacts; the task is unchanged if anything is.
+    """
+    problems: list[Problem] = []
+    fingers, ground = {}, task.ground
+    for name, finger in task.fingers.items():
+        snapped = _snap(finger.touches, task.object, ("fingers", name, "touches"), problems)
+        fingers[name] = finger.model_copy(update={"touches": snapped})
+    if ground:
+        snapped = _snap(ground.touches, task.object, ("ground", "touches"), problems)
+        ground = ground.model_copy(update={"touches": snapped})
+    if problems:
+        return task, problems
+    return _recentre(task.model_copy(update={"fingers": fingers, "ground": ground})), []
+
+
+def _snap(point: Vector, body: ManipulatedObject, path: tuple[str, ...], problems: list[Problem]) -> Vector:
+    """Nearest point of the surface of the nearest primitive, (3,) m; a problem if that is no contact."""
+    start = np.array(point)
+    distances = [abs(shape.signed_distance(start)) for shape in body.shapes]
+    nearest = int(np.argmin(distances))
+    shape, distance = body.shapes[nearest], distances[nearest]
+    given, tolerance = f"{list(point)}", CONTACT_TOLERANCE * body.half_extent
+    if distance > tolerance:
+        allowed = f"a point within {tolerance:.3g} m of the object's surface; this one is {distance:.3g} m from it"
+        problems.append(Problem(path, given, allowed))
+        return point
+    out = start - shape.nearest_on_axis(start)
+    if np.linalg.norm(out) < 1e-6 * shape.radius:
+        problems.append(Problem(path, given, "a point off the axis of its primitive, so that one side is nearest"))
+        return point
+    snapped = start if distance <= _ROUNDING * body.half_extent else (
+        shape.nearest_on_axis(start) + shape.radius * out / np.linalg.norm(out)
+    )
+    for number, other in enumerate(body.shapes):
+        if other is not shape and other.signed_distance(snapped) < -1e-6 * body.half_extent:
+            allowed = f"a point on the outside of the object; this one lies inside object.shapes[{number}]"
+            problems.append(Problem(path, given, allowed))
+            return point
+    return _vector(snapped)
+
+
+def _recentre(task: Task) -> Task:
+    """The same task with the object frame's origin at the centre of mass."""
+    body = task.object
+    center = np.array(body.center_of_mass)
+    origin = (0.0, 0.0, 0.0)
+    if not center.any():
+        return task
+    if np.abs(center).max() <= _ROUNDING * body.half_extent:
+        return task.model_copy(update={"object": body.model_copy(update={"center_of_mass": origin})})
+
+    def shift(point: Vector) -> Vector:
+        return _vector(np.array(point) - center)
+
+    def shift_goal(goal: Goal) -> Goal:
+        if goal.position is None:
+            return goal
+        return goal.model_copy(update={"position": _vector(np.array(goal.position) + goal.rotation.matrix @ center)})
+
+    shapes = tuple(shape.moved(-center) for shape in body.shapes)
+    return task.model_copy(
+        update={
+            "object": body.model_copy(update={"shapes": shapes, "center_of_mass": origin}),
+            "fingers": {
+                name: finger.model_copy(update={"touches": shift(finger.touches)})
+                for name, finger in task.fingers.items()
+            },
+            "ground": task.ground and task.ground.model_copy(update={"touches": shift(task.ground.touches)}),
+            "tool": task.tool and shift(task.tool),
+            "motion": tuple(shift_goal(goal) for goal in task.motion),
+        }
+    )
+
+
+def _vector(array: np.ndarray) -> Vector:
+    x, y, z = (float(value) for value in array)
+    return x, y, z

@@ -1,0 +1,98 @@
+"""The object that the hand moves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from pydantic import Field, field_validator
+
+from casadi_hands.task.fields import Matrix, Positive, Section, Vector, refuse
+from casadi_hands.task.shapes import Capsule, Shape, Sphere
+
+
+def _shares(shapes: tuple[Sphere | Capsule, ...]) -> np.ndarray:
+    volumes = np.array([shape.volume for shape in shapes])
+    return volumes / volumes.sum()
+
+
+def _uniform_center(data: dict[str, Any]) -> tuple[float, ...]:
+    shapes = data["shapes"]
+    center = sum(share * shape.centroid for share, shape in zip(_shares(shapes), shapes, strict=True))
+    return tuple(float(value) for value in np.asarray(center))
+
+
+def _uniform_inertia(data: dict[str, Any]) -> tuple[tuple[float, ...], ...]:
+    shapes, center = data["shapes"], np.array(_uniform_center(data))
+    inertia = np.zeros((3, 3))
+    for share, shape in zip(_shares(shapes), shapes, strict=True):
+        arm = shape.centroid - center
+        inertia += share * (shape.unit_inertia + (arm @ arm) * np.eye(3) - np.outer(arm, arm))
+    return tuple(tuple(float(value) for value in row) for row in data["mass"] * inertia)
+
+
+class ManipulatedObject(Section):
+    """The object: primitives, mass, and where its frame lies.
+
+    A task file may put the object frame anywhere; a loaded task has its origin at the centre of mass.
+    """
+
+    mass: Positive = Field(description="Mass, kg.")
+    shapes: tuple[Shape, ...] = Field(
+        min_length=1,
+        description="The primitives whose union is the object: a list of `sphere: {center, radius}` and "
+        "`capsule: {start, end, radius}`.",
+    )
+    center_of_mass: Vector = Field(
+        default_factory=_uniform_center,
+        description="Centre of mass, m, object frame. After loading it is the frame's origin: everything given in "
+        "the object frame, and the goals, are shifted to it.",
+        json_schema_extra={"default": "that of the primitives, each solid and of one density; overlaps count twice"},
+    )
+    inertia: Matrix = Field(
+        default_factory=_uniform_inertia,
+        description="Inertia about the centre of mass, 3 rows of 3, kg·m², axes of the object frame.",
+        json_schema_extra={"default": "that of the primitives about their own centre; overlaps count twice"},
+    )
+
+    @field_validator("inertia")
+    @classmethod
+    def _physical(cls, inertia: Matrix) -> Matrix:
+        matrix = np.array(inertia)
+        if not np.allclose(matrix, matrix.T, rtol=0, atol=1e-9 * abs(matrix).max()):
+            raise refuse("a symmetric matrix")
+        principal = np.linalg.eigvalsh(matrix)
+        if principal[0] <= 0:
+            raise refuse("a positive definite matrix: every principal moment above 0")
+        # A rod without thickness meets this with equality; leave room for rounding.
+        if principal[2] > (principal[0] + principal[1]) * (1 + 1e-9):
+            raise refuse("principal moments of which none exceeds the sum of the other two, as no solid body has them")
+        return inertia
+
+    @property
+    def half_extent(self) -> float:
+        """Half the largest extent of the bounding box in the object frame, m: the unit of length inside."""
+        lower, upper = self.bounding_box
+        return float((upper - lower).max() / 2)
+
+    @property
+    def bounding_box(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper corner of the box around the primitives, (3,) and (3,), m, object frame."""
+        ends = np.array([(np.array(shape.segment)) for shape in self.shapes])
+        radii = np.array([shape.radius for shape in self.shapes])[:, None, None]
+        return (ends - radii).min(axis=(0, 1)), (ends + radii).max(axis=(0, 1))
+
+    def lowest_point(self, rotation: np.ndarray) -> np.ndarray:
+        """Point of the surface that is lowest with the object turned by ``rotation``.
+
+        Args:
+            rotation: (3, 3) world <- object.
+
+        Returns:
+            (3,) m, object frame; the middle of the lowest line when a capsule lies level.
+        """
+        down = rotation.T @ np.array([0.0, 0.0, -1.0])
+        points = np.array([end + shape.radius * down for shape in self.shapes for end in shape.segment])
+        depths = points @ down
+        lowest = points[depths >= depths.max() - 1e-9 * self.half_extent]
+        return lowest.mean(axis=0)

@@ -1,0 +1,132 @@
+"""The task: everything the user asks for, checked, with every default filled in."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field, ValidationInfo, field_validator
+
+from casadi_hands.task.fields import Positive, Section, Vector, Whole, fill, refuse
+from casadi_hands.task.hand import Actuator, FingerSpec, Ground, HandSpec
+from casadi_hands.task.limits import Limits
+from casadi_hands.task.motion import Goal, Perturbation
+from casadi_hands.task.object import ManipulatedObject
+from casadi_hands.task.palm import Palm
+from casadi_hands.task.search import Search
+from casadi_hands.task.weights import Weights
+
+STANDARD_GRAVITY = 9.81  # m/s²
+
+
+class Task(Section):
+    """One task. Lengths in m, times in s, masses in kg; angles in degrees; world z is up."""
+
+    name: str = Field(min_length=1, description="What the task is called.", json_schema_extra={"default": "the file's name"})
+    about: str = Field(default="", description="What it is about, in a sentence.")
+    object: ManipulatedObject = Field(description="The object to move.")
+    palm: Palm = Field(description="The palm and where it stands.")
+    motion: tuple[Goal, ...] = Field(min_length=2, description="Goals that the object passes through, in order of time.")
+    tool: Vector | None = Field(
+        default=None, description="The point of the object that draws, m, object frame; drawing tasks only."
+    )
+    duration: Positive = Field(
+        default_factory=lambda data: data["motion"][-1].at,
+        description="How long the motion takes, s.",
+        json_schema_extra={"default": "the last goal's time"},
+    )
+    time_step: Annotated[Positive, Field(le=0.1)] = Field(default=0.1, description="Time between samples, s; at most 0.1.")
+    keyframes_between: Annotated[Whole, Field(ge=1, le=3)] = Field(
+        default=2, description="Keyframes between one goal and the next, 1 to 3."
+    )
+    fingers: dict[str, FingerSpec] = Field(min_length=1, description="The fingers by name, one contact each.")
+    friction: Positive = Field(default=0.5, description="Coulomb friction of fingertips and object.")
+    gravity: Vector = Field(default=(0.0, 0.0, -STANDARD_GRAVITY), description="Gravity, m/s², world.")
+    ground: Ground | None = Field(default=None, description="The floor the object may rest on; `none` if there is none.")
+    perturbations: tuple[Perturbation, ...] = Field(default=(), description="Disturbances that the grasp must stand.")
+    hand: HandSpec = Field(default={}, validate_default=True, description="What fingers can be built.")
+    actuator: Actuator | None = Field(default=None, description="The motors; without it torque and speed are free.")
+    limits: Limits = Field(default=Limits(), description="Limits of the certificate.")
+    search: Search = Field(default=Search(), description="The search over structures.")
+    weights: Weights = Field(default=Weights(), description="Weights of the soft stages' cost terms.")
+
+    # Defaults that follow from other sections. Where such a section is itself wrong the task is refused anyway,
+    # and any valid number will do to let the rest of this section be checked.
+
+    @field_validator("palm", mode="before")
+    @classmethod
+    def _palm_defaults(cls, value: Any, info: ValidationInfo) -> Any:
+        body = info.data.get("object")
+        return fill(value, radius=1.2 * body.half_extent if body else 1.0)
+
+    @field_validator("fingers")
+    @classmethod
+    def _finger_names(cls, value: dict[str, FingerSpec]) -> dict[str, FingerSpec]:
+        for name in value:
+            if name == "ground" or not name.replace("_", "").replace("-", "").isalnum():
+                raise refuse(f"names of letters, digits, _ and -, and not 'ground'; {name!r} is not")
+        return value
+
+    @field_validator("ground", mode="before")
+    @classmethod
+    def _ground_defaults(cls, value: Any, info: ValidationInfo) -> Any:
+        if value == "none":
+            return None
+        body, goals = info.data.get("object"), info.data.get("motion")
+        lowest = tuple(map(float, body.lowest_point(goals[0].rotation.matrix))) if body and goals else (0.0, 0.0, 0.0)
+        return fill(value, friction=info.data.get("friction", 1.0), touches=lowest)
+
+    @field_validator("hand", mode="before")
+    @classmethod
+    def _hand_defaults(cls, value: Any, info: ValidationInfo) -> Any:
+        palm, fingers, goals = (info.data.get(name) for name in ("palm", "fingers", "motion"))
+        value = fill(value, link_radius=0.13 * palm.radius if palm else 1.0)
+        if not isinstance(value, dict) or "link_length" in value:
+            return value
+        length = (1.0, 1.0)
+        radius = value["link_radius"]
+        if palm and fingers and goals and isinstance(radius, float | int):
+            reach = palm.radius + _farthest_contact(palm, fingers, goals, info.data.get("tool"))
+            length = (2.0 * radius, max(2.0 * radius, reach))
+        return {**value, "link_length": length}
+
+    @property
+    def draws(self) -> bool:
+        """Whether goals are points of the tool rather than poses of the object."""
+        return self.tool is not None
+
+    @property
+    def force_unit(self) -> float:
+        """The object's weight, N; with gravity off, what it would be at 9.81 m/s²."""
+        return self.object.mass * (float(np.linalg.norm(self.gravity)) or STANDARD_GRAVITY)
+
+    def goal_poses(self) -> tuple[tuple[float, np.ndarray, np.ndarray], ...]:
+        """Time (s), position (3,) (m, world) and rotation vector (3,) (rad) of the object at every goal.
+
+        A drawing goal leaves the pose open; it is given with the object upright and the tool at its point.
+        """
+        return _poses(self.motion, self.tool)
+
+
+def _poses(
+    goals: tuple[Goal, ...], tool: tuple[float, float, float] | None
+) -> tuple[tuple[float, np.ndarray, np.ndarray], ...]:
+    def position(goal: Goal) -> np.ndarray:
+        if goal.tool_at is not None:
+            return np.array(goal.tool_at) - np.array(tool or (0.0, 0.0, 0.0))
+        return np.array(goal.position)
+
+    return tuple((goal.at, position(goal), goal.rotation.vector) for goal in goals)
+
+
+def _farthest_contact(
+    palm: Palm, fingers: dict[str, FingerSpec], goals: tuple[Goal, ...], tool: tuple[float, float, float] | None
+) -> float:
+    """Largest distance over goals and fingers of a contact and the nearest place the palm passes through, m."""
+    centers = np.array([position for _, position, _ in palm.waypoints])
+    contacts = np.array([finger.touches for finger in fingers.values()])
+    farthest = 0.0
+    for goal, (_, position, _) in zip(goals, _poses(goals, tool), strict=True):
+        world = position + contacts @ goal.rotation.matrix.T
+        farthest = max(farthest, min(float(np.linalg.norm(world - center, axis=1).max()) for center in centers))
+    return farthest
