@@ -17,7 +17,7 @@ namespace
 
 using casadi::SX;
 
-// Pinocchio's own collection has 25 joint types and takes most of the compiler's time; a finger needs one.
+// Pinocchio's own collection has 25 joint types, every one of them compile time and memory; a finger needs one.
 // Composite and mimic joints are never used, but the algorithms name them, so they have to be in the variant.
 template<typename S, int O>
 struct FingerJoints
