@@ -6,6 +6,7 @@ from casadi_hands.task.loader import load_task, parse_task
 from casadi_hands.task.motion import Goal, Perturbation
 from casadi_hands.task.object import ManipulatedObject
 from casadi_hands.task.palm import Palm, Waypoint
+from casadi_hands.task.reference import describe_fields
 from casadi_hands.task.rotation import Rotation
 from casadi_hands.task.search import Search
 from casadi_hands.task.shapes import Capsule, Sphere
@@ -30,6 +31,7 @@ __all__ = [
     "Task",
     "Waypoint",
     "Weights",
+    "describe_fields",
     "load_task",
     "parse_task",
     "task_to_yaml",

@@ -2,10 +2,133 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from casadi_hands.task.obstacles import depth_below, depth_in_palm, palm_depth_below
 from casadi_hands.task.problem import Problem
 from casadi_hands.task.task import Task
+
+# The exponential map of orientations is singular at 360°; beyond this turn it is too close.
+_LARGEST_TURN = 300.0
+# Depths below this share of the half extent are the rounding of numbers typed by hand.
+_TYPED = 1e-3
 
 
 def check(task: Task) -> list[Problem]:
     """Find what contradicts itself in a task whose fields are each valid."""
-    return []
+    timing = list(_goal_times(task)) + list(_goal_kinds(task)) + list(_other_times(task))
+    # Where things stand at the goals says nothing while the goals themselves are in doubt.
+    places = [] if timing else list(_turns(task)) + list(_object_places(task)) + list(_palm_places(task))
+    return timing + places + list(_contacts(task)) + list(_object_points(task))
+
+
+def _goal_times(task: Task) -> Iterator[Problem]:
+    times = [goal.at for goal in task.motion]
+    if times[0] != 0:
+        yield Problem(("motion", 0, "at"), f"{times[0]:g}", "0: the first goal is where the motion starts")
+    shortest = (task.keyframes_between + 1) * task.time_step
+    for number, (before, time) in enumerate(pairwise(times), start=1):
+        path = ("motion", number, "at")
+        if time <= before:
+            yield Problem(path, f"{time:g}", f"a time later than that of the goal before, {before:g} s")
+        elif time - before < shortest * (1 - 1e-9):
+            allowed = f"goals at least {shortest:g} s apart: (keyframes_between + 1) × time_step"
+            yield Problem(path, f"{time:g}", allowed)
+        if time > task.duration:
+            yield Problem(path, f"{time:g}", f"a time within the duration, {task.duration:g} s")
+
+
+def _goal_kinds(task: Task) -> Iterator[Problem]:
+    for number, goal in enumerate(task.motion):
+        if goal.tool_at is not None and not task.draws:
+            allowed = "goals by position and rotation; to draw, also give `tool`, the point of the object that draws"
+            yield Problem(("motion", number, "tool_at"), f"{list(goal.tool_at)} without a tool", allowed)
+        if goal.tool_at is None and task.draws:
+            allowed = "tool_at in every goal, since `tool` makes this a drawing task"
+            yield Problem(("motion", number, "position"), "a pose", allowed)
+
+
+def _other_times(task: Task) -> Iterator[Problem]:
+    before = 0.0
+    for number, waypoint in enumerate(task.palm.motion or ()):
+        path = ("palm", "motion", number, "at")
+        if waypoint.at <= before:
+            yield Problem(path, f"{waypoint.at:g}", f"a time later than that of the waypoint before, {before:g} s")
+        if waypoint.at > task.duration:
+            yield Problem(path, f"{waypoint.at:g}", f"a time within the duration, {task.duration:g} s")
+        before = waypoint.at
+    for number, perturbation in enumerate(task.perturbations):
+        if perturbation.end > task.duration:
+            allowed = f"a time within the duration, {task.duration:g} s"
+            yield Problem(("perturbations", number, "to"), f"{perturbation.end:g}", allowed)
+
+
+def _turns(task: Task) -> Iterator[Problem]:
+    """Turns of goals from the first goal's orientation, where they are about one axis and so add up."""
+    first = task.motion[0].rotation.vector
+    for number, goal in enumerate(task.motion):
+        vector = goal.rotation.vector
+        if np.linalg.norm(np.cross(first, vector)) > 1e-9 * max(np.linalg.norm(first) * np.linalg.norm(vector), 1e-300):
+            continue
+        turn = float(np.degrees(np.linalg.norm(vector - first)))
+        if turn > _LARGEST_TURN * (1 + 1e-9):
+            allowed = f"a turn of at most ±{_LARGEST_TURN:g}° from the first goal's orientation; this one is {turn:g}°"
+            yield Problem(("motion", number, "rotation"), f"{goal.rotation.degrees:g} degrees", allowed)
+
+
+def _object_places(task: Task) -> Iterator[Problem]:
+    palm, body = task.palm, task.object
+    fixed = not palm.may_move and not palm.motion
+    for number, (_, position, vector) in enumerate(task.goal_poses()):
+        goal = task.motion[number]
+        path = ("motion", number, "position" if goal.position is not None else "tool_at")
+        given = str(list(goal.position or goal.tool_at or ()))
+        depth = depth_in_palm(body, position, vector, palm)
+        if depth > _TYPED * body.half_extent and (number == 0 or fixed):
+            allowed = f"a place where the object is clear of the palm; here it is {depth:.3g} m inside"
+            yield Problem(path, given, allowed)
+        depth = depth_below(body, position, vector, task.ground.height) if task.ground else 0.0
+        if depth > _TYPED * body.half_extent:
+            allowed = f"a place where the object is above the ground; here it is {depth:.3g} m below"
+            yield Problem(path, given, allowed)
+
+
+def _palm_places(task: Task) -> Iterator[Problem]:
+    if not task.ground:
+        return
+    for number, (_, position, rotation) in enumerate(task.palm.waypoints):
+        depth = palm_depth_below(task.palm, position, rotation, task.ground.height)
+        if depth > _TYPED * task.palm.radius:
+            path = ("palm", "position") if number == 0 else ("palm", "motion", number - 1, "position")
+            allowed = f"a place where the whole palm is above the ground; here it is {depth:.3g} m below"
+            yield Problem(path, str([float(x) for x in position]), allowed)
+
+
+def _contacts(task: Task) -> Iterator[Problem]:
+    names = list(task.fingers)
+    if len(names) == 1 and any(task.gravity) and not task.ground:
+        allowed = "two or more; a single contact cannot hold an object against gravity"
+        yield Problem(("fingers",), "one finger", allowed)
+    for number, name in enumerate(names):
+        for other in names[:number]:
+            apart = np.linalg.norm(np.subtract(task.fingers[name].touches, task.fingers[other].touches))
+            if apart < _TYPED * task.object.half_extent:
+                allowed = f"a point away from that of {other}, since two fingertips cannot be in one place"
+                yield Problem(("fingers", name, "touches"), str(list(task.fingers[name].touches)), allowed)
+
+
+def _object_points(task: Task) -> Iterator[Problem]:
+    body = task.object
+    lower, upper = body.bounding_box
+    center = np.array(body.center_of_mass)
+    if (center < lower).any() or (center > upper).any():
+        allowed = "a point within the box around the object's shapes"
+        yield Problem(("object", "center_of_mass"), str(list(body.center_of_mass)), allowed)
+    if task.tool is not None:
+        distance = min(shape.signed_distance(np.array(task.tool)) for shape in body.shapes)
+        if distance > body.half_extent:
+            allowed = f"a point within {body.half_extent:.3g} m of the object; this one is {distance:.3g} m from it"
+            yield Problem(("tool",), str(list(task.tool)), allowed)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Strict
 from pydantic_core import PydanticCustomError
 
@@ -39,12 +40,6 @@ def _of_length(count: int) -> Callable[[Any], Any]:
     return check
 
 
-def _not_zero(value: tuple[float, ...]) -> tuple[float, ...]:
-    if not any(value):
-        raise refuse("a direction, with at least one number other than 0")
-    return value
-
-
 Number = Annotated[float, Strict(), Field(allow_inf_nan=False)]
 Positive = Annotated[Number, Field(gt=0)]
 NonNegative = Annotated[Number, Field(ge=0)]
@@ -54,6 +49,12 @@ Pair = Annotated[tuple[Number, Number], BeforeValidator(_of_length(2))]
 Vector = Annotated[tuple[Number, Number, Number], BeforeValidator(_of_length(3))]
 Quadruple = Annotated[tuple[Number, Number, Number, Number], BeforeValidator(_of_length(4))]
 Matrix = Annotated[tuple[Vector, Vector, Vector], BeforeValidator(_of_length(3))]
+
+
+def vector(array: np.ndarray) -> Vector:
+    """Plain numbers of an array (3,)."""
+    x, y, z = (float(value) for value in array)
+    return x, y, z
 
 
 def fill(value: Any, **defaults: Any) -> Any:

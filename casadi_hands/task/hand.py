@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 from pydantic import Field, field_validator
 
 from casadi_hands.task.fields import Number, Pair, Positive, Section, Vector, refuse
@@ -25,7 +23,7 @@ class Ground(Section):
         description="Coulomb friction of object and ground.", json_schema_extra={"default": "as `friction`"}
     )
     touches: Vector = Field(
-        description="The point of the object that may rest on the ground, m, object frame; moved onto the nearest surface.",
+        description="Where the object may rest on the ground, m, object frame; moved onto the nearest surface.",
         json_schema_extra={"default": "the object's lowest point at the first goal"},
     )
 
@@ -36,7 +34,7 @@ class HandSpec(Section):
     link_radius: Positive = Field(
         description="Radius of every link, m.", json_schema_extra={"default": "0.13 × palm.radius"}
     )
-    link_length: Annotated[Pair, "min, max"] = Field(
+    link_length: Pair = Field(
         description="Shortest and longest link, m.",
         json_schema_extra={
             "default": "[2 × link_radius, palm.radius + the farthest contact from the palm's centre over the goals]"

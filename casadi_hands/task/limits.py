@@ -20,7 +20,9 @@ class Limits(Section):
     friction_excess: NonNegative = Field(
         default=0.0, description="Tangential force beyond friction × normal force, on either surface, over weight."
     )
-    pull: NonNegative = Field(default=0.0, description="Normal force by which a contact would have to suck, over weight.")
+    pull: NonNegative = Field(
+        default=0.0, description="Normal force by which a contact would have to suck, over weight."
+    )
     penetration: NonNegative = Field(default=0.0001, description="Depth by which two bodies overlap, m.")
     gap: NonNegative = Field(default=0.00005, description="Distance of an active contact's surfaces at samples, m.")
     gap_between: NonNegative = Field(default=0.0001, description="The same between samples, m.")

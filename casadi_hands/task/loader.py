@@ -11,7 +11,6 @@ from casadi_hands.task import yamlfile
 from casadi_hands.task.checks import check
 from casadi_hands.task.messages import explain
 from casadi_hands.task.normalise import normalise
-
 from casadi_hands.task.problem import Problem
 from casadi_hands.task.task import Task
 
@@ -48,7 +47,7 @@ def parse_task(text: str, source: str = "task", name: str = "task") -> Task:
     try:
         task = Task.model_validate({"name": name, **file.data})
     except ValidationError as error:
-        raise _refusal(explain(error.errors(include_url=False), file.data), file) from None
+        raise _refusal(explain(error.errors(include_url=False)), file) from None
     problems = check(task)
     if not problems:
         task, problems = normalise(task)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any
 
 from pydantic_core import ErrorDetails
 
 from casadi_hands.task.problem import Problem
-from casadi_hands.task.structure import names_at, paths_of
+from casadi_hands.task.structure import description_at, names_at, paths_of
 
 _ALLOWED = {
     "float_type": "a number (without quotes or unit; lengths in m, times in s, masses in kg)",
@@ -31,29 +31,32 @@ _ALLOWED = {
 }
 
 
-def explain(errors: Iterable[ErrorDetails], data: Mapping[str, Any]) -> list[Problem]:
-    """Translate what pydantic found.
-
-    Args:
-        errors: its error list.
-        data: the content of the task file, to tell what else was written beside the wrong field.
-    """
-    errors = [error for error in errors if error["type"] != "default_factory_not_called"]
+def explain(errors: Iterable[ErrorDetails]) -> list[Problem]:
+    """Translate what pydantic found."""
+    errors = [error for error in errors if not _follows_from_another(error)]
     unknown = [_unknown(error["loc"]) for error in errors if error["type"] == "extra_forbidden"]
-    meant = {problem.path[:-1] + (guess,) for problem, guess in unknown if guess}
+    meant = {(*problem.path[:-1], guess) for problem, guess in unknown if guess}
     # A misspelt field is reported once: as unknown, not as missing too.
     known = [error for error in errors if error["type"] != "extra_forbidden" and error["loc"] not in meant]
     return [problem for problem, _ in unknown] + [_known(error) for error in known]
+
+
+def _follows_from_another(error: ErrorDetails) -> bool:
+    """Whether an error only says that an earlier one stood in the way."""
+    if error["type"] == "too_short":
+        # Pydantic counts the valid elements; the others have errors of their own.
+        return bool(len(error["input"]) >= error["ctx"]["min_length"])
+    return error["type"] == "default_factory_not_called"
 
 
 def _known(error: ErrorDetails) -> Problem:
     path, kind, given = error["loc"], error["type"], _show(error["input"])
     context = {**error.get("ctx", {}), "names": ", ".join(names_at(path))}
     if kind == "missing":
-        return Problem(path, "nothing", f"required: {_description(path)}")
-    if kind in ("too_short", "too_long"):
-        count = error["ctx"].get("min_length", error["ctx"].get("max_length"))
-        return Problem(path, given, f"{'at least' if kind == 'too_short' else 'at most'} {count} of them")
+        return Problem(path, "nothing", f"a value, it has no default: {description_at(path)}")
+    if kind == "too_short":
+        count = error["ctx"]["min_length"]
+        return Problem(path, f"{len(error['input'])} of them", f"at least {count}: {description_at(path)}")
     return Problem(path, given, _ALLOWED[kind].format(**context) if kind in _ALLOWED else error["msg"])
 
 
@@ -66,12 +69,6 @@ def _unknown(path: tuple[str | int, ...]) -> tuple[Problem, str | None]:
     elsewhere = paths_of(name)
     hint = f"; did you mean {' or '.join(elsewhere)}?" if elsewhere else ""
     return Problem(path, "an unknown field", f"{', '.join(section)}{hint}"), None
-
-
-def _description(path: tuple[str | int, ...]) -> str:
-    from casadi_hands.task.structure import description_at
-
-    return description_at(path)
 
 
 def _show(value: Any) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from casadi_hands.task.fields import Vector
+from casadi_hands.task.fields import Vector, vector
 from casadi_hands.task.motion import Goal
 from casadi_hands.task.object import ManipulatedObject
 from casadi_hands.task.problem import Problem
@@ -51,15 +51,17 @@ def _snap(point: Vector, body: ManipulatedObject, path: tuple[str, ...], problem
     if np.linalg.norm(out) < 1e-6 * shape.radius:
         problems.append(Problem(path, given, "a point off the axis of its primitive, so that one side is nearest"))
         return point
-    snapped = start if distance <= _ROUNDING * body.half_extent else (
-        shape.nearest_on_axis(start) + shape.radius * out / np.linalg.norm(out)
+    snapped = (
+        start
+        if distance <= _ROUNDING * body.half_extent
+        else (shape.nearest_on_axis(start) + shape.radius * out / np.linalg.norm(out))
     )
     for number, other in enumerate(body.shapes):
         if other is not shape and other.signed_distance(snapped) < -1e-6 * body.half_extent:
             allowed = f"a point on the outside of the object; this one lies inside object.shapes[{number}]"
             problems.append(Problem(path, given, allowed))
             return point
-    return _vector(snapped)
+    return vector(snapped)
 
 
 def _recentre(task: Task) -> Task:
@@ -73,12 +75,12 @@ def _recentre(task: Task) -> Task:
         return task.model_copy(update={"object": body.model_copy(update={"center_of_mass": origin})})
 
     def shift(point: Vector) -> Vector:
-        return _vector(np.array(point) - center)
+        return vector(np.array(point) - center)
 
     def shift_goal(goal: Goal) -> Goal:
         if goal.position is None:
             return goal
-        return goal.model_copy(update={"position": _vector(np.array(goal.position) + goal.rotation.matrix @ center)})
+        return goal.model_copy(update={"position": vector(np.array(goal.position) + goal.rotation.matrix @ center)})
 
     shapes = tuple(shape.moved(-center) for shape in body.shapes)
     return task.model_copy(
@@ -93,8 +95,3 @@ def _recentre(task: Task) -> Task:
             "motion": tuple(shift_goal(goal) for goal in task.motion),
         }
     )
-
-
-def _vector(array: np.ndarray) -> Vector:
-    x, y, z = (float(value) for value in array)
-    return x, y, z

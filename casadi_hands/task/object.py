@@ -7,28 +7,29 @@ from typing import Any
 import numpy as np
 from pydantic import Field, field_validator
 
-from casadi_hands.task.fields import Matrix, Positive, Section, Vector, refuse
+from casadi_hands.task.fields import Matrix, Positive, Section, Vector, refuse, vector
 from casadi_hands.task.shapes import Capsule, Shape, Sphere
 
 
 def _shares(shapes: tuple[Sphere | Capsule, ...]) -> np.ndarray:
     volumes = np.array([shape.volume for shape in shapes])
-    return volumes / volumes.sum()
+    shares: np.ndarray = volumes / volumes.sum()
+    return shares
 
 
-def _uniform_center(data: dict[str, Any]) -> tuple[float, ...]:
+def _uniform_center(data: dict[str, Any]) -> Vector:
     shapes = data["shapes"]
-    center = sum(share * shape.centroid for share, shape in zip(_shares(shapes), shapes, strict=True))
-    return tuple(float(value) for value in np.asarray(center))
+    return vector(_shares(shapes) @ np.array([shape.centroid for shape in shapes]))
 
 
-def _uniform_inertia(data: dict[str, Any]) -> tuple[tuple[float, ...], ...]:
+def _uniform_inertia(data: dict[str, Any]) -> Matrix:
     shapes, center = data["shapes"], np.array(_uniform_center(data))
     inertia = np.zeros((3, 3))
     for share, shape in zip(_shares(shapes), shapes, strict=True):
         arm = shape.centroid - center
         inertia += share * (shape.unit_inertia + (arm @ arm) * np.eye(3) - np.outer(arm, arm))
-    return tuple(tuple(float(value) for value in row) for row in data["mass"] * inertia)
+    x, y, z = data["mass"] * inertia
+    return vector(x), vector(y), vector(z)
 
 
 class ManipulatedObject(Section):
@@ -95,4 +96,5 @@ class ManipulatedObject(Section):
         points = np.array([end + shape.radius * down for shape in self.shapes for end in shape.segment])
         depths = points @ down
         lowest = points[depths >= depths.max() - 1e-9 * self.half_extent]
-        return lowest.mean(axis=0)
+        middle: np.ndarray = lowest.mean(axis=0)
+        return middle

@@ -15,7 +15,8 @@ _NEARLY_PARALLEL = 0.985
 
 
 def _unit(vector: Any) -> np.ndarray:
-    return np.array(vector) / np.linalg.norm(vector)
+    unit: np.ndarray = np.array(vector) / np.linalg.norm(vector)
+    return unit
 
 
 def _check_direction(value: Vector | None) -> Vector | None:
@@ -30,7 +31,9 @@ class Waypoint(Section):
     at: Positive = Field(description="Time, s; later than the waypoint before.")
     position: Vector = Field(description="Centre of the palm's surface, m, world.")
     facing: Vector | None = Field(
-        default=None, description="Where the fingers point, world; any length.", json_schema_extra={"default": "as before"}
+        default=None,
+        description="Where the fingers point, world; any length.",
+        json_schema_extra={"default": "as before"},
     )
 
     _direction = field_validator("facing")(_check_direction)
@@ -42,7 +45,9 @@ class Palm(Section):
     Its frame has the origin at the centre of that face, z where the fingers point and x towards `up`.
     """
 
-    radius: Positive = Field(description="Radius of the disc, m.", json_schema_extra={"default": "1.2 × object's half extent"})
+    radius: Positive = Field(
+        description="Radius of the disc, m.", json_schema_extra={"default": "1.2 × object's half extent"}
+    )
     thickness: Positive = Field(
         default_factory=lambda data: 0.2 * data["radius"],
         description="Thickness of the disc, m; it lies behind the face with the fingers.",

@@ -54,7 +54,8 @@ class Rotation(Section):
     def vector(self) -> np.ndarray:
         """Rotation vector, (3,), rad: unit axis times angle, the angle not reduced."""
         axis = np.array(self.axis)
-        return np.radians(self.degrees) * axis / np.linalg.norm(axis)
+        vector: np.ndarray = np.radians(self.degrees) * axis / np.linalg.norm(axis)
+        return vector
 
     @property
     def matrix(self) -> np.ndarray:
@@ -72,4 +73,5 @@ def rotation_matrix(vector: np.ndarray) -> np.ndarray:
         return np.eye(3)
     x, y, z = vector / angle
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    matrix: np.ndarray = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    return matrix

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, SerializerFunctionWrapHandler, Tag, model_serializer
 
-from casadi_hands.task.fields import Positive, Section, Vector
+from casadi_hands.task.fields import Positive, Section, Vector, vector
 
 
 class _Primitive(Section):
@@ -34,7 +34,8 @@ class _Primitive(Section):
     def centroid(self) -> np.ndarray:
         """Centre of the solid, (3,), m, object frame."""
         start, end = self.segment
-        return (start + end) / 2
+        center: np.ndarray = (start + end) / 2
+        return center
 
     @property
     def unit_inertia(self) -> np.ndarray:
@@ -59,7 +60,8 @@ class _Primitive(Section):
         if not along.any():
             return start
         share = np.clip((point - start) @ along / (along @ along), 0.0, 1.0)
-        return start + share * along
+        nearest: np.ndarray = start + share * along
+        return nearest
 
     def signed_distance(self, point: np.ndarray) -> float:
         """Distance from the surface to ``point`` (3,), m; negative inside."""
@@ -82,7 +84,7 @@ class Sphere(_Primitive):
 
     def moved(self, by: np.ndarray) -> Sphere:
         """The same sphere shifted by ``by`` (3,), m."""
-        return Sphere(center=_shift(self.center, by), radius=self.radius)
+        return Sphere(center=vector(np.array(self.center) + by), radius=self.radius)
 
 
 class Capsule(_Primitive):
@@ -102,12 +104,7 @@ class Capsule(_Primitive):
 
     def moved(self, by: np.ndarray) -> Capsule:
         """The same capsule shifted by ``by`` (3,), m."""
-        return Capsule(start=_shift(self.start, by), end=_shift(self.end, by), radius=self.radius)
-
-
-def _shift(point: tuple[float, float, float], by: np.ndarray) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in np.array(point) + by)
-    return x, y, z
+        return Capsule(start=vector(np.array(self.start) + by), end=vector(np.array(self.end) + by), radius=self.radius)
 
 
 def _kind(value: Any) -> str | None:

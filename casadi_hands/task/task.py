@@ -22,11 +22,15 @@ STANDARD_GRAVITY = 9.81  # m/s²
 class Task(Section):
     """One task. Lengths in m, times in s, masses in kg; angles in degrees; world z is up."""
 
-    name: str = Field(min_length=1, description="What the task is called.", json_schema_extra={"default": "the file's name"})
+    name: str = Field(
+        min_length=1, description="What the task is called.", json_schema_extra={"default": "the file's name"}
+    )
     about: str = Field(default="", description="What it is about, in a sentence.")
     object: ManipulatedObject = Field(description="The object to move.")
     palm: Palm = Field(description="The palm and where it stands.")
-    motion: tuple[Goal, ...] = Field(min_length=2, description="Goals that the object passes through, in order of time.")
+    motion: tuple[Goal, ...] = Field(
+        min_length=2, description="Goals that the object passes through, in order of time."
+    )
     tool: Vector | None = Field(
         default=None, description="The point of the object that draws, m, object frame; drawing tasks only."
     )
@@ -35,14 +39,18 @@ class Task(Section):
         description="How long the motion takes, s.",
         json_schema_extra={"default": "the last goal's time"},
     )
-    time_step: Annotated[Positive, Field(le=0.1)] = Field(default=0.1, description="Time between samples, s; at most 0.1.")
+    time_step: Annotated[Positive, Field(le=0.1)] = Field(
+        default=0.1, description="Time between samples, s; at most 0.1."
+    )
     keyframes_between: Annotated[Whole, Field(ge=1, le=3)] = Field(
         default=2, description="Keyframes between one goal and the next, 1 to 3."
     )
     fingers: dict[str, FingerSpec] = Field(min_length=1, description="The fingers by name, one contact each.")
     friction: Positive = Field(default=0.5, description="Coulomb friction of fingertips and object.")
     gravity: Vector = Field(default=(0.0, 0.0, -STANDARD_GRAVITY), description="Gravity, m/s², world.")
-    ground: Ground | None = Field(default=None, description="The floor the object may rest on; `none` if there is none.")
+    ground: Ground | None = Field(
+        default=None, description="The floor the object may rest on; `none` if there is none."
+    )
     perturbations: tuple[Perturbation, ...] = Field(default=(), description="Disturbances that the grasp must stand.")
     hand: HandSpec = Field(default={}, validate_default=True, description="What fingers can be built.")
     actuator: Actuator | None = Field(default=None, description="The motors; without it torque and speed are free.")
@@ -108,19 +116,18 @@ class Task(Section):
         return _poses(self.motion, self.tool)
 
 
-def _poses(
-    goals: tuple[Goal, ...], tool: tuple[float, float, float] | None
-) -> tuple[tuple[float, np.ndarray, np.ndarray], ...]:
+def _poses(goals: tuple[Goal, ...], tool: Vector | None) -> tuple[tuple[float, np.ndarray, np.ndarray], ...]:
     def position(goal: Goal) -> np.ndarray:
         if goal.tool_at is not None:
-            return np.array(goal.tool_at) - np.array(tool or (0.0, 0.0, 0.0))
-        return np.array(goal.position)
+            start: np.ndarray = np.array(goal.tool_at) - np.array(tool or (0.0, 0.0, 0.0))
+            return start
+        return np.array(goal.position, dtype=float)
 
     return tuple((goal.at, position(goal), goal.rotation.vector) for goal in goals)
 
 
 def _farthest_contact(
-    palm: Palm, fingers: dict[str, FingerSpec], goals: tuple[Goal, ...], tool: tuple[float, float, float] | None
+    palm: Palm, fingers: dict[str, FingerSpec], goals: tuple[Goal, ...], tool: Vector | None
 ) -> float:
     """Largest distance over goals and fingers of a contact and the nearest place the palm passes through, m."""
     centers = np.array([position for _, position, _ in palm.waypoints])

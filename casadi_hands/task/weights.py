@@ -54,7 +54,9 @@ class FloatingWeights(_WeightTable):
     object_angular_acceleration: NonNegative = Field(default=1.0, description="Object's rate of spin (eq. 2.15).")
     palm_clearance: NonNegative = Field(default=100.0, description="Object and palm overlapping (3.2.3).")
     contact_patch: NonNegative = Field(default=1.0, description="Contacts away from where the task put them.")
-    friction_sharpness: Positive = Field(default=5.0, description="Sharpness of the friction cone, not a weight (eq. 2.8).")
+    friction_sharpness: Positive = Field(
+        default=5.0, description="Sharpness of the friction cone, not a weight (eq. 2.8)."
+    )
 
 
 class SynthesisWeights(_WeightTable):
@@ -64,13 +66,17 @@ class SynthesisWeights(_WeightTable):
         default=(50.0, 10.0, 50.0), description="Fingertip at its contact (eq. 2.18), by annealing step."
     )
     tip_on_surface: NonNegative = Field(default=1000.0, description="Contact on the fingertip's surface (eq. 2.19).")
-    collision: Annealed = Field(default=(0.1, 5.0, 100.0), description="Bodies overlapping (eq. 2.20), by annealing step.")
+    collision: Annealed = Field(
+        default=(0.1, 5.0, 100.0), description="Bodies overlapping (eq. 2.20), by annealing step."
+    )
     length: NonNegative = Field(default=0.1, description="Length of links (eq. 2.21).")
     minimum_length: NonNegative = Field(default=1.0, description="Links below the shortest (eq. 2.22).")
     null_space: NonNegative = Field(default=1.0, description="Forces that no joint supplies (eq. 2.23).")
     torque: NonNegative = Field(default=0.05, description="Joint torques (eq. 2.24).")
     finger_base: NonNegative = Field(default=1.0, description="Fingers off the palm (eq. 2.25).")
-    fingertip_acceleration: NonNegative = Field(default=0.001, description="Acceleration of free fingertips (eq. 2.26).")
+    fingertip_acceleration: NonNegative = Field(
+        default=0.001, description="Acceleration of free fingertips (eq. 2.26)."
+    )
     joint_limits: NonNegative = Field(default=1.0, description="Joints beyond their limits (eq. 2.27).")
 
 
@@ -86,7 +92,9 @@ class WholeHandWeights(FloatingWeights):
     collision: NonNegative = Field(default=100.0, description="Bodies overlapping (eq. 2.20).")
     null_space: NonNegative = Field(default=1.0, description="Forces that no joint supplies (eq. 2.23).")
     torque: NonNegative = Field(default=0.05, description="Joint torques (eq. 2.24).")
-    friction_cone_hand: NonNegative = Field(default=0.1, description="Friction against the fingertip's normal (eq. 2.8).")
+    friction_cone_hand: NonNegative = Field(
+        default=0.1, description="Friction against the fingertip's normal (eq. 2.8)."
+    )
     base_acceleration: NonNegative = Field(default=0.01, description="Acceleration of a palm that may move.")
 
 

@@ -10,26 +10,28 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from casadi_hands.task.task import Task
 
+_LONGEST_LINE = 100
+
 
 def task_to_yaml(task: Task) -> str:
     """Write a task as a task file with every default filled in; loading it gives an equal task."""
     yaml = YAML(typ="rt")
-    yaml.width = 120
+    # Broken flow collections read badly, and none is longer than this once the long ones are blocks.
+    yaml.width = 10 * _LONGEST_LINE
     stream = io.StringIO()
     yaml.dump(_styled(task.model_dump(by_alias=True, exclude_none=True)), stream)
     return stream.getvalue()
 
 
 def _styled(value: Any) -> Any:
-    """Copy for the writer: whatever holds only scalars, or lists of them, goes on one line."""
+    """Copy for the writer: what is short goes on one line."""
+    if not isinstance(value, dict | list | tuple):
+        return value
+    styled: CommentedMap | CommentedSeq
     if isinstance(value, dict):
-        mapping = CommentedMap((name, _styled(item)) for name, item in value.items())
-        if len(value) <= 4 and not any(isinstance(item, dict) for item in value.values()):
-            mapping.fa.set_flow_style()
-        return mapping
-    if isinstance(value, list | tuple):
-        sequence = CommentedSeq(_styled(item) for item in value)
-        if not any(isinstance(item, dict) for item in value):
-            sequence.fa.set_flow_style()
-        return sequence
-    return value
+        styled = CommentedMap((name, _styled(item)) for name, item in value.items())
+    else:
+        styled = CommentedSeq(_styled(item) for item in value)
+    if len(str(value)) <= _LONGEST_LINE:
+        styled.fa.set_flow_style()
+    return styled

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -42,11 +43,9 @@ class TaskFile:
         """Line of the value at ``path``, from 1; of the deepest part of the path that the file has."""
         node, line = self._tree, 1
         for step in path:
-            try:
+            # What is not written here, a default, a missing field or a value merged from an anchor, has no line.
+            with suppress(AttributeError, KeyError, TypeError, IndexError):
                 line = (node.lc.item(step) if isinstance(step, int) else node.lc.key(step))[0] + 1
-            except (AttributeError, KeyError, TypeError, IndexError):
-                # Not written here: a default, a missing field, or a value merged from an anchor.
-                pass
             try:
                 node = node[step]
             except (KeyError, TypeError, IndexError):
@@ -61,7 +60,7 @@ def read(path: FilePath) -> str:
         TaskError: there is none, or it is not text.
     """
     if not path.exists():
-        raise TaskError(f"{path}: no such file; give the path of a task file, such as problems/horizontal_translation.yaml")
+        raise TaskError(f"{path}: no such file; give the path of a task file")
     if path.is_dir():
         raise TaskError(f"{path}: is a directory; give the path of a task file in it")
     try:
@@ -90,8 +89,10 @@ def _parse(text: str, source: str) -> Any:
     if tree is None:
         raise TaskError(f"{source}: empty; a task file needs at least object, palm, motion and fingers")
     if not isinstance(tree, dict):
-        raise TaskError(f"{source}:1: given {type(tree).__name__.removeprefix('Commented').lower()}; "
-                        "a task file is a mapping of fields such as object, palm, motion and fingers")
+        raise TaskError(
+            f"{source}:1: given {type(tree).__name__.removeprefix('Commented').lower()}; "
+            "a task file is a mapping of fields such as object, palm, motion and fingers"
+        )
     return tree
 
 

@@ -1,0 +1,68 @@
+"""The reference of the task file's fields, written from the schema itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from casadi_hands.task.fields import Section
+from casadi_hands.task.rotation import Rotation
+from casadi_hands.task.structure import fields_of, sections_in
+from casadi_hands.task.task import Task
+
+
+def describe_fields() -> str:
+    """Markdown: a table for each section of the task file, with every field's default and meaning."""
+    return "\n".join(line for name, section in _sections(Task, "") for line in [*_table(name, section), ""])
+
+
+def _sections(section: type[Section], name: str) -> Iterator[tuple[str, type[Section]]]:
+    """A section and all below it, with the path at which a file writes them."""
+    yield name, section
+    for field_name, field in fields_of(section).items():
+        for inner in sections_in(field.annotation):
+            path = f"{name}.{field_name}" if name else field_name
+            if "list" in _shape(field) or "mapping" in _shape(field):
+                path += "[]" if "list" in _shape(field) else ".<name>"
+            if len(sections_in(field.annotation)) > 1:
+                path += f".{inner.__name__.lower()}"
+            yield from _sections(inner, path)
+
+
+def _table(name: str, section: type[Section]) -> Iterator[str]:
+    yield f"### {f'`{name}`' if name else 'The task file'}"
+    yield ""
+    # Only the first paragraph: the rest of a docstring is for who reads the code.
+    yield " ".join((section.__doc__ or "").split("\n\n")[0].split())
+    yield ""
+    yield "| field | default | meaning |"
+    yield "|---|---|---|"
+    for field_name, field in fields_of(section).items():
+        yield f"| `{field_name}` | {_default(field)} | {field.description} |"
+    if section is Rotation:
+        yield "| `quaternion` | | Instead of axis and degrees: [w, x, y, z], object to world, of any length but 0. |"
+
+
+def _shape(field: FieldInfo) -> str:
+    text = str(field.annotation)
+    return "mapping" if "dict[" in text else "list" if "..." in text else "one"
+
+
+def _default(field: FieldInfo) -> str:
+    extra = field.json_schema_extra
+    if isinstance(extra, dict) and "default" in extra:
+        return str(extra["default"])
+    default = field.default
+    if default is PydanticUndefined:
+        return "required"
+    if default is None or default == ():
+        return "none"
+    if isinstance(default, Section | dict):
+        return "its fields' defaults"
+    if isinstance(default, bool):
+        return str(default).lower()
+    if isinstance(default, tuple):
+        return f"[{', '.join(f'{value:g}' for value in default)}]"
+    return f"{default:g}" if isinstance(default, float) else f'"{default}"' if default == "" else str(default)
