@@ -1,0 +1,73 @@
+"""The audit: every figure of the certificate, recomputed from the files of a result folder.
+
+Nothing of the optimiser takes part: kinematics by numeric Pinocchio on ``hand.urdf``, distances by coal, the object's
+physics integrated anew (see ``dynamics``), the motion between samples rebuilt from the samples (see ``trajectory``).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from casadi_hands.verify.clearance import joint_figures, penetration_figure
+from casadi_hands.verify.contact import (
+    friction_figures,
+    gap_at_samples,
+    gap_between_samples,
+    slip_figure,
+    spin_figure,
+)
+from casadi_hands.verify.dynamics import Shots, between_residual, sample_residual, shoot
+from casadi_hands.verify.folder import Folder, read_folder
+from casadi_hands.verify.goals import goal_figures
+from casadi_hands.verify.report import Audit, Figure
+from casadi_hands.verify.structure import structure_problems
+from casadi_hands.verify.trajectory import build_trajectory, sample_placements
+from casadi_hands.verify.wrench import disturbance_figure, torque_figure, unsupplied_figure
+
+
+def audit(directory: str | Path) -> Audit:
+    """Recompute every figure of a result folder and hold it against the task's limits.
+
+    Raises:
+        DesignError: a file is missing or cannot be read as the format says.
+        TaskError: ``task.yaml`` is not a task.
+    """
+    folder = read_folder(directory)
+    problems = structure_problems(folder)
+    shots, placed = shoot(folder), sample_placements(folder)
+    path = build_trajectory(folder, shots)
+    figures = [
+        Figure("structure", float(len(problems)), 0.0, "", "{value} disagreements within the files"),
+        *goal_figures(folder),
+        *residual_figures(folder, shots),
+        *friction_figures(folder, placed),
+        gap_at_samples(folder, placed),
+        gap_between_samples(folder, path),
+        slip_figure(folder, path),
+        spin_figure(folder, path),
+        penetration_figure(folder, path),
+        *joint_figures(folder, path),
+        torque_figure(folder),
+        unsupplied_figure(folder),
+        disturbance_figure(folder, placed),
+    ]
+    return Audit(folder.task.name, {figure.name: figure for figure in figures}, tuple(problems))
+
+
+def residual_figures(folder: Folder, shots: Shots) -> list[Figure]:
+    """Return the Newton-Euler residual at the samples and between them, over the weight (torque: times l)."""
+    limits, time = folder.task.limits, folder.motion.time
+    force, torque = sample_residual(folder, shots)
+    kind, values = max((("force", force), ("torque", torque)), key=lambda item: float(np.max(item[1])))
+    k = int(np.argmax(values))
+    words = f"a {kind} of {{value}} that nothing exerts moves the object at {time[k + 1]:.3g} s"
+    at = Figure("residual", float(values[k]), limits.residual, "weight", words)
+    between = between_residual(folder)
+    k = int(np.argmax(between))
+    words = f"between {time[k]:.3g} s and {time[k + 1]:.3g} s the contacts' surfaces turn the object by {{value}} unstated"
+    inside = float(between[k])
+    if at.value > inside:
+        inside, words = at.value, at.finding
+    return [at, Figure("residual_between", inside, limits.residual_between, "weight", words)]

@@ -1,0 +1,114 @@
+"""What the audit found: figures, their limits, and reasons in the user's words."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from rich.table import Table
+
+_UNITS = {
+    "m": (1000.0, " mm"),
+    "deg": (1.0, " deg"),
+    "weight": (1.0, " of the weight"),
+    "N·m": (1.0, " N·m"),
+    "rad/s": (1.0, " rad/s"),
+    "share": (100.0, " %"),
+    "": (1.0, ""),
+}
+
+
+def show(value: float, unit: str) -> str:
+    """Return an SI value as a reader likes it: 0.0031 m -> ``3.1 mm``."""
+    scale, suffix = _UNITS[unit]
+    return f"{value * scale:.3g}{suffix}"
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One measured figure.
+
+    Attributes:
+        name: as in the certificate and, where it has a limit, in the task's ``limits``.
+        value: the worst value over the motion, in ``unit``.
+        limit: None when nothing is asked of the figure.
+        unit: ``m``, ``deg``, ``weight`` (the object's), ``share``, ``N·m``, ``rad/s`` or none.
+        finding: the worst case as a sentence with ``{value}`` in it.
+        at_least: whether the limit is a least value rather than a largest one.
+    """
+
+    name: str
+    value: float
+    limit: float | None
+    unit: str
+    finding: str
+    at_least: bool = False
+
+    @property
+    def holds(self) -> bool:
+        """Whether the limit is kept; a value that is not a number keeps none."""
+        if self.limit is None:
+            return True
+        return self.value >= self.limit if self.at_least else self.value <= self.limit
+
+    @property
+    def text(self) -> str:
+        """The finding with its value."""
+        return self.finding.format(value=show(self.value, self.unit))
+
+    @property
+    def reason(self) -> str:
+        """The finding, its value and the limit it misses."""
+        return self.text if self.limit is None else f"{self.text}; limit {show(self.limit, self.unit)}"
+
+
+@dataclass(frozen=True)
+class Audit:
+    """All figures of one design.
+
+    Attributes:
+        name: of the task.
+        figures: by name, in the order they are reported.
+        problems: what is wrong with the files themselves, a sentence each.
+    """
+
+    name: str
+    figures: dict[str, Figure]
+    problems: tuple[str, ...]
+
+    @property
+    def certified(self) -> bool:
+        """Whether every limit holds."""
+        return all(figure.holds for figure in self.figures.values())
+
+    @property
+    def reasons(self) -> list[str]:
+        """Why the design is not certified; empty when it is."""
+        missed = [f.reason for name, f in self.figures.items() if not f.holds and name != "structure"]
+        return [*self.problems, *missed]
+
+    def as_certificate(self) -> dict[str, dict[str, Any]]:
+        """Return the ``certificate`` of result.json; a value that is not finite is null."""
+        return {
+            name: {
+                "value": figure.value if math.isfinite(figure.value) else None,
+                "limit": figure.limit,
+                "holds": figure.holds,
+                "unit": figure.unit,
+                "where": figure.text,
+            }
+            for name, figure in self.figures.items()
+        }
+
+    def table(self) -> Table:
+        """Return the figures as a table for the terminal."""
+        table = Table(title=f"{self.name}: {'certified' if self.certified else 'not certified'}")
+        for column in ("figure", "value", "limit", "", "worst case"):
+            table.add_column(column, justify="right" if column in ("value", "limit") else "left")
+        for name, figure in self.figures.items():
+            limit = "" if figure.limit is None else show(figure.limit, figure.unit)
+            mark = "" if figure.limit is None else "[green]holds[/]" if figure.holds else "[red]missed[/]"
+            finding = "; ".join(self.problems) if name == "structure" and self.problems else figure.text
+            table.add_row(name.replace("_", " "), show(figure.value, figure.unit), limit, mark, finding)
+        return table

@@ -1,0 +1,296 @@
+"""Result folders made by hand: small scenes whose physics is known, written as the format says."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+from casadi_hands.design import Finger, Hand, Link, Motion
+from casadi_hands.task import Task, load_task, task_to_yaml
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What a result folder says."""
+
+    task: Task
+    hand: Hand
+    motion: Motion
+    changes: dict[str, Any] = field(default_factory=dict)
+
+    def write(self, directory: Path) -> Path:
+        """Write task.yaml, hand.urdf, object.urdf, motion.npz and result.json."""
+        directory.mkdir(parents=True, exist_ok=True)
+        (directory / "task.yaml").write_text(task_to_yaml(self.task))
+        (directory / "hand.urdf").write_text(hand_urdf(self.hand))
+        (directory / "object.urdf").write_text(object_urdf(self.task))
+        arrays = {name: np.asarray(getattr(self.motion, name)) for name in Motion.__dataclass_fields__}
+        np.savez(directory / "motion.npz", **arrays)
+        (directory / "result.json").write_text(json.dumps({**result(self.task, self.hand), **self.changes}))
+        return directory
+
+    def moved(self, **arrays: Any) -> Scene:
+        """Return the scene with other arrays in its motion."""
+        return replace(self, motion=replace(self.motion, **arrays))
+
+
+def read_task(directory: Path, text: str) -> Task:
+    """Load a task from YAML text."""
+    directory.mkdir(parents=True, exist_ok=True)
+    (directory / "written.yaml").write_text(text)
+    return load_task(directory / "written.yaml")
+
+
+def _element(parent: ElementTree.Element, tag: str, **attributes: Any) -> ElementTree.Element:
+    def text(value: Any) -> str:
+        return value if isinstance(value, str) else " ".join(repr(float(x)) for x in np.atleast_1d(value))
+
+    return ElementTree.SubElement(parent, tag, {name: text(value) for name, value in attributes.items()})
+
+
+def _inertial(link: ElementTree.Element, mass: float, center: Any, inertia: np.ndarray) -> None:
+    inertial = _element(link, "inertial")
+    _element(inertial, "origin", xyz=center)
+    _element(inertial, "mass", value=mass)
+    names = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
+    _element(inertial, "inertia", **{name: inertia[at] for name, at in names.items()})
+
+
+def _capsule(link: ElementTree.Element, start: Any, end: Any, radius: float) -> None:
+    start, end = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
+    for at in (start, end) if np.any(start != end) else (start,):
+        collision = _element(link, "collision")
+        _element(collision, "origin", xyz=at)
+        _element(_element(collision, "geometry"), "sphere", radius=radius)
+    axis = end - start
+    if np.any(axis):
+        length = float(np.linalg.norm(axis))
+        x, y, z = axis / length
+        collision = _element(link, "collision")
+        # Rolling by a about x and pitching by b about y takes z to (sin b cos a, -sin a, cos b cos a).
+        roll = np.arcsin(-y)
+        _element(collision, "origin", xyz=(start + end) / 2, rpy=[roll, np.arctan2(x, z), 0.0])
+        _element(_element(collision, "geometry"), "cylinder", radius=radius, length=length)
+
+
+def hand_urdf(hand: Hand) -> str:
+    """Write the hand as the format says."""
+    robot = ElementTree.Element("robot", name="hand")
+    palm = _element(robot, "link", name="palm")
+    mass = hand.density * np.pi * hand.palm_radius**2 * hand.palm_thickness
+    _inertial(palm, mass, [0, 0, -hand.palm_thickness / 2], 1e-3 * mass * np.eye(3))
+    collision = _element(palm, "collision")
+    _element(collision, "origin", xyz=[0, 0, -hand.palm_thickness / 2])
+    _element(_element(collision, "geometry"), "cylinder", radius=hand.palm_radius, length=hand.palm_thickness)
+    for i, finger in enumerate(hand.fingers):
+        parent, origin = "palm", np.asarray(finger.base)
+        for j, segment in enumerate(finger.links):
+            name = f"finger{i}_link{j}"
+            link = _element(robot, "link", name=name)
+            mass = hand.density * np.pi * segment.radius**2 * (segment.length + 4 / 3 * segment.radius)
+            _inertial(link, mass, [0, 0, segment.length / 2], 1e-4 * mass * np.eye(3))
+            _capsule(link, [0, 0, 0], [0, 0, segment.length], segment.radius)
+            joint = _element(robot, "joint", name=f"finger{i}_joint{j}", type="revolute")
+            _element(joint, "parent", link=parent)
+            _element(joint, "child", link=name)
+            _element(joint, "origin", xyz=origin)
+            _element(joint, "axis", xyz=segment.axis)
+            limits = {"lower": hand.joint_lower, "upper": hand.joint_upper}
+            _element(joint, "limit", **limits, effort=hand.effort, velocity=hand.velocity)
+            parent, origin = name, np.array([0, 0, segment.length])
+    return ElementTree.tostring(robot, encoding="unicode")
+
+
+def object_urdf(task: Task) -> str:
+    """Write the object as the format says."""
+    robot = ElementTree.Element("robot", name="object")
+    link = _element(robot, "link", name="object")
+    _inertial(link, task.object.mass, [0, 0, 0], np.asarray(task.object.inertia))
+    for shape in task.object.shapes:
+        _capsule(link, *shape.segment, shape.radius)
+    return ElementTree.tostring(robot, encoding="unicode")
+
+
+def result(task: Task, hand: Hand) -> dict[str, Any]:
+    """Return the part of result.json that the audit reads."""
+    fingers = [
+        {"name": f.name, "base": f.base, "links": [{"length": s.length, "radius": s.radius, "axis": s.axis} for s in f.links]}
+        for f in hand.fingers
+    ]
+    goals = [
+        {
+            "time": goal.at,
+            "position": list(goal.position or (0, 0, 0)),
+            "orientation": Rotation.from_rotvec(goal.rotation.vector).as_quat(scalar_first=True).tolist(),
+        }
+        for goal in task.motion
+    ]
+    return {
+        "format": 1,
+        "status": "feasible",
+        "object": {"mass": task.object.mass, "inertia": np.asarray(task.object.inertia).tolist()},
+        "friction": task.friction,
+        "gravity": list(task.gravity),
+        "goals": goals,
+        "hand": {"palm": {"radius": hand.palm_radius, "thickness": hand.palm_thickness}, "fingers": fingers},
+    }
+
+
+MASS, RADIUS, TIP = 0.1, 0.02, 0.006
+CONTACTS = np.array([[RADIUS, 0.0, 0.004], *([-RADIUS / 2, s * RADIUS * np.sqrt(3) / 2, -0.002] for s in (1, -1))])
+"""(3, 3) contact points on a capsule's side, 120 degrees apart, object frame."""
+
+_TASK = """
+name: carried
+object: {{mass: 0.1, shapes: [{{capsule: {{start: [0, 0, -0.03], end: [0, 0, 0.03], radius: 0.02}}}}]}}
+palm: {{radius: 0.05, position: [0, 0, 0.2], facing: [0, 0, 1], moves: true}}
+motion:
+{goals}
+fingers: {{one: {{touches: {0}}}, two: {{touches: {1}}}, three: {{touches: {2}}}}}
+friction: 0.9
+hand: {{joint_limits: [-150, 150], link_radius: 0.006}}
+actuator: {{torque: 0.5, speed: 5}}
+limits: {{unsupplied_force: 10}}
+"""
+
+
+def carried(directory: Path) -> Scene:
+    """Three fingers of two joints, held stiff, and a capsule between them; the palm carries all along a free curve.
+
+    Forces are chosen first and SciPy integrates the capsule under them; the palm then follows it rigidly. So physics
+    holds to the integrator's 1e-12, nothing slips, and the contact points stay where they are.
+    """
+    time = np.linspace(0.0, 2.0, 21)
+    inertia = np.diag([4.6e-5, 4.6e-5, 1.8e-5])
+    draft = _TASK.format(*(c.tolist() for c in CONTACTS), goals=_goals([0, 2], [[0, 0, 0.28]] * 2, [[1, 0, 0, 0]] * 2))
+    task = read_task(directory, draft)
+    inertia = np.asarray(task.object.inertia)
+    forces = _carrying_forces(time, task.object.mass, inertia)
+    position, quaternion = integrate(
+        time, forces, CONTACTS, task.object.mass, inertia, np.asarray(task.gravity), np.array([0, 0, 0.28])
+    )
+    goals = _goals([0, 1, 2], position[[0, 10, 20]], quaternion[[0, 10, 20]])
+    task = read_task(directory, _TASK.format(*(c.tolist() for c in CONTACTS), goals=goals))
+    hand, angles, points = _grasp(task)
+    turn = Rotation.from_quat(quaternion, scalar_first=True)
+    base = Rotation.from_matrix(task.palm.rotation)
+    samples = len(time)
+    motion = Motion(
+        time=time,
+        object_position=position,
+        object_orientation=quaternion,
+        base_position=position + turn.apply([0, 0, -0.08]),
+        base_orientation=(turn * base).as_quat(scalar_first=True),
+        joint_angles=np.tile(angles, (samples, 1)),
+        joint_names=hand.joint_names,
+        contact_names=("one", "two", "three"),
+        contact_link=("finger0_link1", "finger1_link1", "finger2_link1"),
+        contact_active=np.ones((samples, 3), dtype=bool),
+        contact_force=np.array([turn[k].apply(forces[k]) for k in range(samples)]),
+        contact_point_object=np.tile(CONTACTS, (samples, 1, 1)),
+        contact_point_link=np.tile(points, (samples, 1, 1)),
+        external_force=np.zeros((samples, 3)),
+        external_torque=np.zeros((samples, 3)),
+    )
+    return Scene(task, hand, motion)
+
+
+def _goals(times: Any, positions: Any, quaternions: Any) -> str:
+    lines = [
+        f"  - {{at: {float(t)}, position: {np.asarray(p).tolist()}, rotation: {{quaternion: {np.asarray(q).tolist()}}}}}"
+        for t, p, q in zip(times, positions, quaternions, strict=True)
+    ]
+    return "\n".join(lines)
+
+
+def _carrying_forces(time: np.ndarray, mass: float, inertia: np.ndarray) -> np.ndarray:
+    """Return (S, 3, 3) contact forces in the object's frame: a squeeze, and what a planned motion needs roughly."""
+    grasp = np.vstack([np.hstack([np.eye(3)] * 3), np.hstack([_skew(point) for point in CONTACTS])])
+    axis = np.array([1.0, 2.0, 0.5]) / np.linalg.norm([1.0, 2.0, 0.5])
+    inward = (-1.5 * np.array([[p[0], p[1], 0.0] for p in CONTACTS]) / RADIUS).ravel()
+    squeeze = inward - np.linalg.lstsq(grasp, grasp @ inward, rcond=None)[0]
+    forces = []
+    for t in time:
+        angle, spin_up = 0.25 * (1 - np.cos(np.pi * t)), 0.25 * np.pi**2 * np.cos(np.pi * t)
+        acceleration = 0.02 * np.pi**2 * np.cos(np.pi * t) * np.array([1.0, 0.5, 0.3])
+        turn = Rotation.from_rotvec(angle * axis)
+        force = turn.apply(mass * (acceleration + [0, 0, 9.81]), inverse=True)
+        wrench = np.concatenate([force, inertia @ axis * spin_up])
+        forces.append(np.linalg.lstsq(grasp, wrench, rcond=None)[0] + squeeze)
+    return np.array(forces).reshape(-1, 3, 3)
+
+
+def _skew(v: np.ndarray) -> np.ndarray:
+    return np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+
+
+def integrate(
+    time: np.ndarray,
+    forces: np.ndarray,
+    points: np.ndarray,
+    mass: float,
+    inertia: np.ndarray,
+    gravity: np.ndarray,
+    start: np.ndarray,
+    rate: Any = (0.0, 0.0, 0.0),
+) -> tuple[np.ndarray, np.ndarray]:
+    """Integrate a body with SciPy under forces (S, C, 3) at fixed points (C, 3), both in its own frame.
+
+    Returns:
+        positions (S, 3) and orientations (S, 4) [w, x, y, z] at the times; it starts upright and at rest but for ``rate``.
+    """
+    state = np.concatenate([start, np.zeros(3), np.eye(3).ravel(), rate])
+    positions, turns = [state[:3]], [np.eye(3)]
+    for k in range(len(time) - 1):
+
+        def slope(t: float, y: np.ndarray, k: int = k) -> np.ndarray:
+            share = (t - time[k]) / (time[k + 1] - time[k])
+            force = (1 - share) * forces[k] + share * forces[k + 1]
+            turn, omega = y[6:15].reshape(3, 3), y[15:]
+            torque = sum(_skew(p) @ f for p, f in zip(points, force, strict=True))
+            acceleration = turn @ force.sum(axis=0) / mass + gravity
+            spin = np.linalg.solve(inertia, torque - np.cross(omega, inertia @ omega))
+            return np.concatenate([y[3:6], acceleration, (turn @ _skew(omega)).ravel(), spin])
+
+        solution = solve_ivp(slope, time[k : k + 2], state, method="DOP853", rtol=1e-13, atol=1e-15)
+        state = solution.y[:, -1]
+        positions.append(state[:3])
+        turns.append(state[6:15].reshape(3, 3))
+    return np.array(positions), Rotation.from_matrix(np.array(turns)).as_quat(scalar_first=True)
+
+
+def _grasp(task: Task) -> tuple[Hand, np.ndarray, np.ndarray]:
+    """Return a hand whose three fingers touch the contacts, its angles (6,) and link points (3, 3).
+
+    Each finger leans out and then in, in the plane of the palm's normal and its contact's direction.
+    """
+    to_palm = Rotation.from_matrix(task.palm.rotation).inv()
+    fingers, angles, points = [], [], []
+    out_angle, in_angle = np.deg2rad(30.0), np.deg2rad(-25.0)
+    for name, contact in zip(task.fingers, CONTACTS, strict=True):
+        radial = to_palm.apply([contact[0], contact[1], 0.0]) / RADIUS
+        tip = to_palm.apply(contact) + [0, 0, 0.08] + TIP * radial
+        outer, inner = _lean(radial, out_angle), _lean(radial, in_angle)
+        # Both lengths follow from where the tip is once the base is 38 mm from the palm's centre.
+        base = 0.038 * radial
+        lengths = np.linalg.lstsq(np.column_stack([outer, inner]), tip - base, rcond=None)[0]
+        axis = tuple(np.cross([0, 0, 1], radial).tolist())
+        links = tuple(Link(float(length), TIP, axis) for length in lengths)
+        fingers.append(Finger(name, tuple(base.tolist()), links))
+        angles += [out_angle, in_angle - out_angle]
+        turn = Rotation.from_rotvec(in_angle * np.array(axis))
+        points.append(turn.apply(-TIP * radial, inverse=True) + [0, 0, lengths[1]])
+    limits = np.deg2rad(150.0)
+    hand = Hand(0.05, float(task.palm.thickness), tuple(fingers), -limits, limits, 0.5, 5.0, float(task.hand.density))
+    return hand, np.array(angles), np.array(points)
+
+
+def _lean(radial: np.ndarray, angle: float) -> np.ndarray:
+    return np.cos(angle) * np.array([0.0, 0.0, 1.0]) + np.sin(angle) * radial
