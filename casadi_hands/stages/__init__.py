@@ -1,0 +1,1 @@
+"""The four optimisations: which variables, which terms, what start."""

@@ -1,0 +1,129 @@
+"""Stage 1: the object's motion with disembodied contacts (section 2.2.1), and its defuzzification."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from casadi_hands.motion import linear
+from casadi_hands.nlp import Options, Problem, Solution, Solver
+from casadi_hands.stages.model import Model
+from casadi_hands.stages.object_side import bind_object, declare_object, object_parameters, sizes, term_weights
+from casadi_hands.stages.grasp import least_squares_forces, passes_gate
+
+Array = NDArray[np.float64]
+THRESHOLDS = (0.1, 0.2, 0.3)
+OPTIONS = Options(max_iter=300, tol=1e-4, acceptable_tol=1e-3)
+
+
+@dataclass(frozen=True)
+class Floating:
+    """A motion of the object with its contacts and forces; nondimensional, see ``Model``.
+
+    Attributes:
+        pose: (N, 6) at the keyframes: position and rotation vector from the reference, world.
+        point: (N, C, 3) object frame; the ground's contact, if any, last.
+        force: (S, C, 3) object frame, at the samples.
+        active: (N, C) bool.
+        activity: (N, C) the contact invariants before thresholds.
+        threshold: that gave ``active``; 0 where all contacts had to stay.
+        runs: every solve: (what, solution).
+    """
+
+    pose: Array
+    point: Array
+    force: Array
+    active: NDArray[np.bool_]
+    activity: Array
+    threshold: float
+    runs: tuple[tuple[str, Solution], ...]
+
+    @property
+    def solution(self) -> Solution:
+        """The solve this motion is from."""
+        return self.runs[-1][1]
+
+
+class FloatingStage:
+    """The stage's problem, built once for a task's structure."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        problem = Problem()
+        side = declare_object(problem, model)
+        bind_object(problem, model, side)
+        self.solver = Solver(problem)
+
+    def start(self) -> dict[str, Array]:
+        """Goals interpolated, contacts fixed in the object, forces of a least-squares grasp."""
+        model, schedule = self.model, self.model.schedule
+        keyframes, samples, contacts = sizes(model)
+        positions = model.goal_positions if model.tool is None else model.goal_positions - model.tool
+        goals = np.hstack([positions, model.goal_vectors])
+        pose = linear(schedule.keyframes[list(schedule.goals)], schedule.keyframes) @ goals
+        patches = model.patches if model.ground is None else np.vstack([model.patches, model.ground.patch])
+        turned = (linear(schedule.keyframes, schedule.samples) @ pose)[:, 3:]
+        reference = pin.Quaternion(*model.reference).matrix()
+        force = np.array([least_squares_forces(model, pin.exp3(v) @ reference) for v in turned])
+        start = {
+            "pose": pose,
+            "point": np.tile(patches.reshape(1, -1), (keyframes, 1)),
+            "force": force.reshape(samples, -1),
+            "activity": np.full((keyframes, contacts), 0.9),
+        }
+        if model.perturbed:
+            start["force_perturbed"] = start["force"]
+        return start
+
+    def solve(self, weights: Mapping[str, float]) -> Floating:
+        """Solve with free contact invariants, then with each threshold's flags, and keep the best that passes the gate.
+
+        The gate: at every keyframe the active contacts can produce the wrench that the motion needs. Where no
+        threshold passes, all contacts stay active.
+        """
+        parameters = object_parameters(self.model) | term_weights(self.solver.problem, self.model, weights)
+        free = self.solver.solve(self.start(), parameters, OPTIONS)
+        runs = [("free", free)]
+        best: tuple[float, float, Solution] | None = None
+        for flags, threshold in self._candidates(free.values["activity"]):
+            solution = self._with_flags(flags, free, parameters)
+            runs.append((f"threshold {threshold}", solution))
+            if (best is None or solution.objective < best[1]) and passes_gate(self.model, solution.values):
+                best = (threshold, solution.objective, solution)
+        if best is None:
+            solution = self._with_flags(np.ones_like(free.values["activity"]), free, parameters)
+            best = (0.0, solution.objective, solution)
+            runs.append(("all active", solution))
+        threshold, _, chosen = best
+        runs.append(("chosen", chosen))
+        values, contacts = chosen.values, sizes(self.model)[2]
+        return Floating(
+            pose=values["pose"],
+            point=values["point"].reshape(-1, contacts, 3),
+            force=values["force"].reshape(-1, contacts, 3),
+            active=values["activity"] > 0.5,
+            activity=free.values["activity"],
+            threshold=threshold,
+            runs=tuple(runs),
+        )
+
+    def _candidates(self, activity: Array) -> list[tuple[Array, float]]:
+        """Distinct flags (N, C) of the thresholds; a keyframe left with too few contacts keeps its strongest."""
+        candidates: list[tuple[Array, float]] = []
+        least = min(2, self.model.contacts)
+        for threshold in THRESHOLDS:
+            flags = activity > threshold
+            for row, strengths in zip(flags, activity, strict=True):
+                row[np.argsort(-strengths, kind="stable")[:least]] = True
+            if not any(np.array_equal(flags, other) for other, _ in candidates):
+                candidates.append((flags.astype(float), threshold))
+        return candidates
+
+    def _with_flags(self, flags: Array, start: Solution, parameters: Mapping[str, Array | float]) -> Solution:
+        return self.solver.solve(
+            {**start.values, "activity": flags}, parameters, OPTIONS, lower={"activity": flags}, upper={"activity": flags}
+        )

@@ -1,0 +1,87 @@
+"""Grasp statics in numbers: what forces can make a wrench."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+from casadi_hands.stages.model import Model
+
+Array = NDArray[np.float64]
+_PRELOAD = 1.0  # m·g, normal force of the first guess
+_EDGES = 8  # of a linearised friction cone
+_GATE = 0.05  # m·g, unbalanced wrench that the gate lets pass: what the soft stages leave anyway
+
+
+def grasp_map(points: Array) -> Array:
+    """(6, 3C) from contact forces to the wrench about the object's origin; points (C, 3), all in one frame."""
+    return np.vstack([np.tile(np.eye(3), len(points)), np.hstack([pin.skew(p) for p in points])])
+
+
+def inward_normals(points: Array, capsules: Array) -> Array:
+    """(C, 3) unit normals into the object at surface points (C, 3) of capsules (C, 7), object frame."""
+    normals = []
+    for point, capsule in zip(points, capsules, strict=True):
+        along = capsule[3:6] - capsule[:3]
+        squared = float(along @ along)
+        fraction = np.clip((point - capsule[:3]) @ along / squared, 0, 1) if squared else 0.0
+        outward = point - capsule[:3] - fraction * along
+        normals.append(-outward / max(float(np.linalg.norm(outward)), 1e-9))
+    return np.array(normals)
+
+
+def _surfaces(model: Model) -> tuple[Array, Array, Array]:
+    """Patches, capsules and friction of all contacts, the ground's included."""
+    if model.ground is None:
+        return model.patches, model.capsules, np.full(model.contacts, model.friction)
+    ground = model.ground
+    friction = np.append(np.full(model.contacts, model.friction), ground.friction)
+    return np.vstack([model.patches, ground.patch]), np.vstack([model.capsules, ground.capsule]), friction
+
+
+def least_squares_forces(model: Model, rotation: Array) -> Array:
+    """Contact forces (C, 3) in the object's frame that hold its weight: a normal preload, corrected to balance."""
+    points, capsules, _ = _surfaces(model)
+    preload = _PRELOAD * inward_normals(points, capsules)
+    grasp = grasp_map(points)
+    missing = np.concatenate([-rotation.T @ model.gravity, np.zeros(3)]) - grasp @ preload.reshape(-1)
+    return preload + (np.linalg.pinv(grasp) @ missing).reshape(-1, 3)
+
+
+def friction_edges(normals: Array, friction: Array) -> Array:
+    """(3, C·edges) unit-normal-force edges of the linearised friction cones, inscribed."""
+    columns = []
+    for normal, mu in zip(normals, friction, strict=True):
+        across = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+        across /= np.linalg.norm(across)
+        other = np.cross(normal, across)
+        for angle in np.linspace(0, 2 * np.pi, _EDGES, endpoint=False):
+            columns.append(normal + mu * (np.cos(angle) * across + np.sin(angle) * other))
+    return np.array(columns).T
+
+
+def passes_gate(model: Model, values: Mapping[str, Array]) -> bool:
+    """Whether at every keyframe the active contacts have the rank of all contacts and can make the needed wrench."""
+    _, capsules, friction = _surfaces(model)
+    contacts = len(capsules)
+    samples = model.schedule.keyframe_samples
+    for k, sample in enumerate(samples):
+        points = values["point"][k].reshape(contacts, 3)
+        active = values["activity"][k] > 0.5
+        forces = values["force"][sample].reshape(contacts, 3) * active[:, None]
+        needed = grasp_map(points) @ forces.reshape(-1)
+        grasp = grasp_map(points[active])
+        if np.linalg.matrix_rank(grasp, 1e-6) < np.linalg.matrix_rank(grasp_map(points), 1e-6):
+            return False
+        edges = friction_edges(inward_normals(points[active], capsules[active]), friction[active])
+        wrenches = np.vstack([edges, np.zeros((3, edges.shape[1]))])
+        for i, point in enumerate(points[active]):
+            span = slice(i * _EDGES, (i + 1) * _EDGES)
+            wrenches[3:, span] = np.cross(point[None, :], edges[:, span].T).T
+        if nnls(wrenches, needed)[1] > _GATE:
+            return False
+    return True

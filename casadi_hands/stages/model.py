@@ -1,0 +1,252 @@
+"""The task in the numbers the stages work in: lengths by the object's half extent, forces by m·g, seconds.
+
+The only place where SI units turn into nondimensional ones (method notes: weights only make sense so).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from casadi_hands.motion import Schedule, linear, nearest_exponential
+from casadi_hands.task import Task
+
+Array = NDArray[np.float64]
+STANDARD_GRAVITY = 9.81  # m/s², sets the force unit where a task has none
+_DIGITS = 12  # significant digits kept, so that scaled tasks give the very same numbers
+
+
+@dataclass(frozen=True)
+class Units:
+    """Size of one nondimensional unit in SI.
+
+    Attributes:
+        length: m.
+        force: N.
+        gravity: m/s², force over mass.
+    """
+
+    length: float
+    force: float
+    gravity: float
+
+    @property
+    def torque(self) -> float:
+        """N·m."""
+        return self.force * self.length
+
+    @property
+    def inertial(self) -> float:
+        """Length over gravity, s²: what turns lengths/s² into m·g."""
+        return round_off(self.length / self.gravity)
+
+
+@dataclass(frozen=True)
+class Ground:
+    """A horizontal plane; ``patch`` is where on the object it may touch, (3,) object frame."""
+
+    height: float
+    friction: float
+    patch: Array
+    capsule: Array
+
+
+@dataclass(frozen=True)
+class Model:
+    """Everything the stages need of a task, nondimensional; arrays are read only by agreement.
+
+    Attributes:
+        units: of all numbers here.
+        schedule: keyframes and samples, s.
+        gravity: (3,) weight in m·g.
+        inertia: (3, 3) object frame, in m·length².
+        primitives: (K, 7) start, end, radius of the object's capsules, object frame.
+        contact_names: of the C contacts.
+        patches: (C, 3) the user's contact points, object frame.
+        capsules: (C, 7) the primitive each contact lies on.
+        friction: of fingertip and object.
+        ground: or None.
+        palm_radius: of the disc.
+        palm_position: (S, 3) world, at the samples.
+        palm_quaternion: (S, 4) world from palm, [w, x, y, z].
+        goal_positions: (G, 3) world; for a drawing the tool's targets.
+        goal_vectors: (G, 3) rotation vectors from the reference orientation, world; zeros for a drawing.
+        reference: (4,) quaternion of the reference orientation.
+        tool: (3,) object frame, or None when goals are poses.
+        perturbation_force: (S, 3) m·g, world.
+        perturbation_torque: (S, 3) m·g·length, world.
+        link_radius: of all links.
+        link_length: shortest and longest link.
+        joint_limits: lower and upper, rad.
+        torque_limit: of a joint in m·g·length, or inf.
+        speed_limit: of a joint in rad/s, or inf.
+    """
+
+    units: Units
+    schedule: Schedule
+    gravity: Array
+    inertia: Array
+    primitives: Array
+    contact_names: tuple[str, ...]
+    patches: Array
+    capsules: Array
+    friction: float
+    ground: Ground | None
+    palm_radius: float
+    palm_position: Array
+    palm_quaternion: Array
+    goal_positions: Array
+    goal_vectors: Array
+    reference: Array
+    tool: Array | None
+    perturbation_force: Array
+    perturbation_torque: Array
+    link_radius: float
+    link_length: tuple[float, float]
+    joint_limits: tuple[float, float]
+    torque_limit: float
+    speed_limit: float
+
+    @property
+    def contacts(self) -> int:
+        """Number of finger contacts."""
+        return len(self.contact_names)
+
+    @property
+    def perturbed(self) -> bool:
+        """Whether the task asks for a second scenario with external wrenches."""
+        return bool(np.any(self.perturbation_force) or np.any(self.perturbation_torque))
+
+    @cached_property
+    def structure(self) -> str:
+        """A text equal for equal models, to key caches."""
+        return repr([(f.name, _plain(getattr(self, f.name))) for f in fields(self)])
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if hasattr(value, "__dataclass_fields__"):
+        return [(f.name, _plain(getattr(value, f.name))) for f in fields(value)]
+    return value
+
+
+def round_off(value: Any) -> Any:
+    """Numbers to 12 significant digits."""
+    array = np.asarray(value, float)
+    magnitude = np.where(array == 0, 1.0, 10.0 ** np.floor(np.log10(np.abs(np.where(array == 0, 1.0, array)))))
+    rounded = np.round(array / magnitude, _DIGITS) * magnitude
+    return float(rounded) if array.ndim == 0 else rounded
+
+
+def quaternion(rotation: ArrayLike) -> Array:
+    """Unit quaternion [w, x, y, z] of a rotation matrix (3, 3)."""
+    x, y, z, w = pin.Quaternion(np.asarray(rotation, float)).coeffs()
+    return np.array([w, x, y, z]) * (1.0 if w >= 0 else -1.0)
+
+
+def build_model(task: Task) -> Model:
+    """Turn a task into nondimensional numbers."""
+    gravity_size = float(np.linalg.norm(task.gravity))
+    acceleration = gravity_size if gravity_size > 0 else STANDARD_GRAVITY
+    length = task.object.half_extent
+    units = Units(length, task.object.mass * acceleration, acceleration)
+    schedule = Schedule.of([goal.at for goal in task.motion], task.duration, task.keyframes_between, task.time_step)
+    primitives = np.array([[*np.ravel(s.segment), s.radius] for s in task.object.shapes]) / length
+    patches = np.array([finger.touches for finger in task.fingers.values()]) / length
+    positions, vectors, reference = _goals(task)
+    palm_position, palm_quaternion = _palm(task, schedule)
+    forces, torques = _perturbations(task, schedule)
+    ground = None
+    if task.ground is not None:
+        patch = np.asarray(task.ground.touches, float) / length
+        capsule = _nearest_primitive(patch, primitives)
+        ground = Ground(round_off(task.ground.height / length), task.ground.friction, round_off(patch), round_off(capsule))
+    actuator = task.actuator
+    low, high = task.hand.joint_limits
+    return Model(
+        units=units,
+        schedule=schedule,
+        gravity=round_off(np.asarray(task.gravity) / acceleration),
+        inertia=round_off(np.asarray(task.object.inertia) / (task.object.mass * length**2)),
+        primitives=round_off(primitives),
+        contact_names=tuple(task.fingers),
+        patches=round_off(patches),
+        capsules=round_off(np.array([_nearest_primitive(p, primitives) for p in patches])),
+        friction=task.friction,
+        ground=ground,
+        palm_radius=round_off(task.palm.radius / length),
+        palm_position=round_off(palm_position / length),
+        palm_quaternion=palm_quaternion,
+        goal_positions=round_off(positions / length),
+        goal_vectors=vectors,
+        reference=reference,
+        tool=None if not task.draws else round_off(np.asarray(task.tool) / length),
+        perturbation_force=round_off(forces / units.force),
+        perturbation_torque=round_off(torques / units.torque),
+        link_radius=round_off(task.hand.link_radius / length),
+        link_length=(round_off(task.hand.link_length[0] / length), round_off(task.hand.link_length[1] / length)),
+        joint_limits=(math.radians(low), math.radians(high)),
+        torque_limit=math.inf if actuator is None else round_off(actuator.torque / units.torque),
+        speed_limit=math.inf if actuator is None else actuator.speed,
+    )
+
+
+def _nearest_primitive(point: Array, primitives: Array) -> Array:
+    """The primitive (7,) whose surface is nearest to a point."""
+
+    def distance(primitive: Array) -> float:
+        start, along = primitive[:3], primitive[3:6] - primitive[:3]
+        squared = float(along @ along)
+        fraction = np.clip((point - start) @ along / squared, 0, 1) if squared else 0.0
+        return abs(float(np.linalg.norm(point - start - fraction * along)) - float(primitive[6]))
+
+    return np.asarray(min(primitives, key=distance))
+
+
+def _goals(task: Task) -> tuple[Array, Array, Array]:
+    """Goal positions (m), rotation vectors from the reference, and the reference quaternion."""
+    if task.draws:
+        points = np.array([goal.tool_at for goal in task.motion], float)
+        return points, np.zeros((len(points), 3)), np.array([1.0, 0.0, 0.0, 0.0])
+    stated = np.array([goal.rotation.vector for goal in task.motion], float)
+    first = pin.exp3(stated[0])
+    vectors = [np.zeros(3)]
+    for vector in stated[1:]:
+        axes = {tuple(np.round(v / np.linalg.norm(v), 9)) for v in (stated[0], vector) if np.linalg.norm(v) > 1e-9}
+        parallel = len({tuple(np.abs(a)) for a in axes}) <= 1
+        expected = vector - stated[0] if parallel else vectors[-1]
+        vectors.append(nearest_exponential(pin.exp3(vector) @ first.T, expected))
+    positions = np.array([goal.position for goal in task.motion], float)
+    return positions, np.array(vectors), quaternion(first)
+
+
+def _palm(task: Task, schedule: Schedule) -> tuple[Array, Array]:
+    """Palm positions (S, 3) in m and quaternions (S, 4) at the samples, between the task's waypoints."""
+    times, positions, rotations = zip(*task.palm.waypoints, strict=True)
+    if len(times) == 1:
+        count = len(schedule.samples)
+        return np.tile(positions[0], (count, 1)), np.tile(quaternion(rotations[0]), (count, 1))
+    weights = linear(times, schedule.samples)
+    quaternions = []
+    for row in weights:
+        later = int(np.flatnonzero(row)[-1])
+        start, end = (pin.Quaternion(np.asarray(rotations[i])) for i in (max(later - 1, 0), later))
+        quaternions.append(quaternion(start.slerp(float(row[later]), end).matrix()))
+    return weights @ np.array(positions), np.array(quaternions)
+
+
+def _perturbations(task: Task, schedule: Schedule) -> tuple[Array, Array]:
+    """External force (S, 3) in N and torque (S, 3) in N·m at the samples."""
+    forces, torques = np.zeros((2, len(schedule.samples), 3))
+    for push in task.perturbations:
+        during = (schedule.samples >= push.start - 1e-9) & (schedule.samples <= push.end + 1e-9)
+        forces[during] += np.asarray(push.force)
+        torques[during] += np.asarray(push.torque)
+    return forces, torques

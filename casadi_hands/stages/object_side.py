@@ -1,0 +1,204 @@
+"""The object's motion, contacts and forces as a part of a problem: variables, kernels, parameter values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from casadi_hands.motion import linear
+from casadi_hands.nlp import Problem, Rows
+from casadi_hands.stages import kernels
+from casadi_hands.stages.model import Model
+
+Array = NDArray[np.float64]
+NO_GROUND = -1e3  # a height no object reaches, half extents
+CLEARANCE = 0.02  # of object and palm, half extents
+MOST_FORCE = 20.0  # m·g, a bound on each component of a contact force
+MOST_TURN = 5.6  # rad, up to where the exponential map's coordinates are used
+
+_WEIGHT_OF = {  # terms of the ground's contact take the weights of the fingers' ones
+    "ground_friction_cone": "friction_cone",
+    "contact_on_ground": "contact_on_object",
+    "slip_on_ground": "tangential_slip",
+}
+
+
+@dataclass(frozen=True)
+class ObjectSide:
+    """Rows that kernels read, at the samples unless said otherwise; the ground's contact, if any, is the last.
+
+    Attributes:
+        pose: (S, 6) at time offsets of -1, 0 and +1 steps.
+        point: (S, 3C) contact points at the same offsets, object frame.
+        force: (S, 3C) in the object's frame, at every sample a variable of its own.
+        perturbed: (S, 3C) forces of the second scenario, or None.
+        activity: (S, C) contact invariants, held from each keyframe to the next.
+        keyframe_pose: (N, 6).
+        keyframe_activity: (N, C).
+    """
+
+    pose: tuple[Rows, Rows, Rows]
+    point: tuple[Rows, Rows, Rows]
+    force: Rows
+    perturbed: Rows | None
+    activity: Rows
+    keyframe_pose: Rows
+    keyframe_activity: Rows
+
+
+def sizes(model: Model) -> tuple[int, int, int]:
+    """Number of keyframes, samples and contacts (the ground's included)."""
+    schedule = model.schedule
+    return len(schedule.keyframes), len(schedule.samples), model.contacts + (model.ground is not None)
+
+
+def declare_object(problem: Problem, model: Model) -> ObjectSide:
+    """Declare ``pose`` (N, 6), ``point`` (N, 3C), ``force`` (S, 3C), ``activity`` (N, C), ``force_perturbed``."""
+    schedule = model.schedule
+    keyframes, samples, contacts = sizes(model)
+    widest = np.array([np.inf] * 3 + [MOST_TURN] * 3)
+    pose = problem.variable("pose", (keyframes, 6), -widest, widest)
+    point = problem.variable("point", (keyframes, 3 * contacts))
+    force = problem.variable("force", (samples, 3 * contacts), -MOST_FORCE, MOST_FORCE)
+    activity = problem.variable("activity", (keyframes, contacts), 0, 1)
+    perturbed = None
+    if model.perturbed:
+        perturbed = problem.variable("force_perturbed", (samples, 3 * contacts), -MOST_FORCE, MOST_FORCE)
+    before, now, after = (schedule.spline(offset) for offset in (-1, 0, 1))
+    return ObjectSide(
+        pose=(pose.combine(before), pose.combine(now), pose.combine(after)),
+        point=(point.combine(before), point.combine(now), point.combine(after)),
+        force=force,
+        perturbed=perturbed,
+        activity=activity.take(schedule.sample_keyframes),
+        keyframe_pose=pose,
+        keyframe_activity=activity,
+    )
+
+
+def bind_object(problem: Problem, model: Model, side: ObjectSide) -> None:
+    """Bind every kernel of the object's side; parameters are those of ``object_parameters``."""
+    for name, width in (("reference", 4), ("step", 1), ("gravity", 3), ("nothing", 3), ("inertia", 9), ("inertial", 1)):
+        problem.parameter(name, (1, width))
+    for name in ("friction", "sharpness", "clearance", "ground_height"):
+        problem.parameter(name, (1, 1))
+    _bind_scenario(problem, model, side, side.force, "")
+    if side.perturbed is not None:
+        _bind_scenario(problem, model, side, side.perturbed, "_perturbed")
+    _bind_points(problem, model, side)
+    _bind_goals(problem, model, side)
+    _bind_clearance(problem, model, side)
+
+
+def _bind_scenario(problem: Problem, model: Model, side: ObjectSide, force: Rows, suffix: str) -> None:
+    """Physics and contact forces, without and with the task's perturbations."""
+    p = problem.parameters
+    _, samples, contacts = sizes(model)
+    if suffix:
+        external = [problem.parameter(f"perturbation_{kind}", (samples, 3)) for kind in ("force", "torque")]
+    else:
+        external = [p["nothing"], p["nothing"]]
+    common = [p["reference"], p["step"], p["gravity"], *external, p["inertia"], p["inertial"]]
+    kernel = kernels.dynamics(contacts, suffix, regularise=not suffix)
+    problem.bind(kernel, [*side.pose, side.point[1], force, side.activity], common)
+    kernel = kernels.contact_forces(suffix)
+    capsules = problem.parameter(f"capsules{suffix}", (model.contacts, 7))
+    for i in range(model.contacts):
+        span = (3 * i, 3 * i + 3)
+        rows = [force.entries(*span), side.activity.entries(i, i + 1), side.point[1].entries(*span)]
+        parameters = [capsules[i : i + 1], p["friction"], p["sharpness"], p["step"]]
+        problem.bind(kernel, [*rows, side.point[0].entries(*span)], parameters)
+    if model.ground is not None:
+        i, span = contacts - 1, (3 * contacts - 3, 3 * contacts)
+        rows = [side.pose[1], side.pose[0], side.point[1].entries(*span), force.entries(*span)]
+        rows.append(side.activity.entries(i, i + 1))
+        capsule, friction = (problem.parameter(f"ground_{n}{suffix}", (1, k)) for n, k in (("capsule", 7), ("friction", 1)))
+        parameters = [p["reference"], capsule, p["ground_height"], friction, p["sharpness"], p["step"]]
+        problem.bind(kernels.ground_contact(suffix), rows, parameters)
+
+
+def _bind_points(problem: Problem, model: Model, side: ObjectSide) -> None:
+    p, contacts = problem.parameters, sizes(model)[2]
+    patches = problem.parameter("patches", (contacts, 3))
+    kernel = kernels.contact_motion()
+    for i in range(contacts):
+        rows = [points.entries(3 * i, 3 * i + 3) for points in side.point]
+        problem.bind(kernel, rows, [patches[i : i + 1], p["step"]])
+    least = min(2, model.contacts)
+    problem.bind(kernels.enough_contacts(contacts), [side.keyframe_activity], [], {"sum": (least, np.inf)})
+
+
+def _bind_goals(problem: Problem, model: Model, side: ObjectSide) -> None:
+    p = problem.parameters
+    if model.tool is not None:
+        targets, tool = problem.parameter("targets", (sizes(model)[1], 3)), problem.parameter("tool", (1, 3))
+        problem.bind(kernels.goal_point(), [side.pose[1]], [p["reference"], targets, tool])
+    else:
+        shape = model.goal_positions.shape
+        targets, vectors = problem.parameter("targets", shape), problem.parameter("vectors", shape)
+        rows = side.keyframe_pose.take(model.schedule.goals)
+        problem.bind(kernels.goal_pose(), [rows], [p["reference"], targets, vectors])
+
+
+def _bind_clearance(problem: Problem, model: Model, side: ObjectSide) -> None:
+    p, samples = problem.parameters, sizes(model)[1]
+    palm = [problem.parameter(f"palm_{n}", (samples, k)) for n, k in (("position", 3), ("quaternion", 4))]
+    radius = problem.parameter("palm_radius", (1, 1))
+    primitives = problem.parameter("primitives", (len(model.primitives), 7))
+    kernel = kernels.palm_clearance()
+    for i in range(len(model.primitives)):
+        parameters = [p["reference"], primitives[i : i + 1], *palm, radius, p["ground_height"], p["clearance"]]
+        problem.bind(kernel, [side.pose[1]], parameters)
+
+
+def object_parameters(model: Model) -> dict[str, Array | float]:
+    """Values of all parameters of the object's side but the weights."""
+    ground = model.ground
+    patches = model.patches if ground is None else np.vstack([model.patches, ground.patch])
+    values: dict[str, Array | float] = {
+        "reference": model.reference,
+        "step": model.schedule.step,
+        "gravity": model.gravity,
+        "nothing": 0.0,
+        "inertia": model.inertia.reshape(1, 9),
+        "inertial": model.units.inertial,
+        "friction": model.friction,
+        "clearance": CLEARANCE,
+        "ground_height": NO_GROUND if ground is None else ground.height,
+        "patches": patches,
+        "palm_position": model.palm_position,
+        "palm_quaternion": model.palm_quaternion,
+        "palm_radius": model.palm_radius,
+        "primitives": model.primitives,
+        "targets": model.goal_positions,
+    }
+    if model.tool is not None:
+        values["tool"] = model.tool
+        weights = linear(model.schedule.keyframes[list(model.schedule.goals)], model.schedule.samples)
+        values["targets"] = weights @ model.goal_positions
+    else:
+        values["vectors"] = model.goal_vectors
+    for suffix in ("", "_perturbed") if model.perturbed else ("",):
+        values[f"capsules{suffix}"] = model.capsules
+        if ground is not None:
+            values[f"ground_capsule{suffix}"] = ground.capsule
+            values[f"ground_friction{suffix}"] = ground.friction
+    if model.perturbed:
+        values["perturbation_force"] = model.perturbation_force
+        values["perturbation_torque"] = model.perturbation_torque
+    return values
+
+
+def term_weights(problem: Problem, model: Model, weights: Mapping[str, float]) -> dict[str, float]:
+    """Weight parameters of a stage: all terms but the task's are divided by the number of keyframes."""
+    keyframes, samples, _ = sizes(model)
+    count = samples if model.tool is not None else len(model.goal_positions)
+    values = {}
+    for term in problem.terms:
+        plain = term.removesuffix("_perturbed")
+        weight = float(weights[_WEIGHT_OF.get(plain, plain)])
+        values[f"weight.{term}"] = weight / (count if plain == "task" else keyframes)
+    return {**values, "sharpness": float(weights["friction_sharpness"])}

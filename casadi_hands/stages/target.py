@@ -1,0 +1,155 @@
+"""What fingers must follow: a floating motion seen from the palm, nondimensional."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from casadi_hands.motion import catmull_rom
+from casadi_hands.stages.floating import Floating
+from casadi_hands.stages.grasp import inward_normals
+from casadi_hands.stages.model import Model
+
+Array = NDArray[np.float64]
+_NO_GROUND = -1e3
+
+
+@dataclass(frozen=True)
+class Target:
+    """Contacts, forces and the object's pose in the palm frame at the keyframes.
+
+    Attributes:
+        times: (N,) s.
+        points: (N, C, 3) on the object's surface.
+        normals: (N, C, 3) into the object.
+        forces: (N, C, 3) on the object, m·g.
+        needed: (N, 6) wrench about the object's centre that the fingers make together, palm axes.
+        centers: (N, 3) the object's centre of mass.
+        active: (N, C) bool.
+        friction: μ.
+        pose: (N, 6) of the object in the world, as the floating stage has it.
+        palm_radius, link_radius, link_length, joint_limits: as ``Model``.
+        model: the task.
+    """
+
+    times: Array
+    points: Array
+    normals: Array
+    forces: Array
+    needed: Array
+    centers: Array
+    active: NDArray[np.bool_]
+    pose: Array
+    model: Model
+
+    @property
+    def palm_radius(self) -> float:
+        """Of the disc, half extents."""
+        return self.model.palm_radius
+
+    @property
+    def link_radius(self) -> float:
+        """Of every link, half extents."""
+        return self.model.link_radius
+
+    @property
+    def link_length(self) -> tuple[float, float]:
+        """Shortest and longest, half extents."""
+        return self.model.link_length
+
+    @property
+    def joint_limits(self) -> tuple[float, float]:
+        """Lower and upper, rad."""
+        return self.model.joint_limits
+
+    @property
+    def primitive_count(self) -> int:
+        """Number of the object's capsules."""
+        return len(self.model.primitives)
+
+    @property
+    def tip_arc(self) -> float:
+        """How far along the fingertip's surface a contact may be from the cap's pole."""
+        return self.link_radius * np.pi / 2 + 0.3 * self.link_length[0]
+
+    def string_of(self, contact: int) -> NDArray[np.int64]:
+        """For each keyframe (N,) the string of active keyframes it belongs to; idle ones count with the next."""
+        active = self.active[:, contact]
+        starts = active & ~np.concatenate([[False], active[:-1]])
+        strings = np.cumsum(starts) - 1
+        return np.clip(np.where(active, strings, strings + 1), 0, max(int(starts.sum()) - 1, 0))
+
+    def strings(self, contact: int) -> int:
+        """Number of strings of a contact, at least 1."""
+        return int(self.string_of(contact).max()) + 1
+
+    def collision_times(self, between: int) -> Array:
+        """The keyframes with ``between`` more times in each gap, s."""
+        return self.model.schedule.between(between)
+
+    def scene(self, times: Array) -> tuple[Array, Array, Array]:
+        """The object's capsules (T, 7K), the ground's normal (T, 3) and its offset (T,) in the palm frame."""
+        model = self.model
+        poses = catmull_rom(self.times, times) @ self.pose
+        primitives, up, offset = [], [], []
+        for time, pose in zip(times, poses, strict=True):
+            rotation, position = palm_from_world(model, time)
+            turn = rotation @ pin.exp3(pose[3:]) @ pin.Quaternion(*model.reference).matrix()
+            center = rotation @ (pose[:3] - position)
+            moved = [np.concatenate([turn @ c[:3] + center, turn @ c[3:6] + center, c[6:]]) for c in model.primitives]
+            primitives.append(np.concatenate(moved))
+            up.append(rotation[:, 2])
+            height = _NO_GROUND if model.ground is None else model.ground.height
+            offset.append(height - position[2])
+        return np.array(primitives), np.array(up), np.array(offset)
+
+
+def palm_from_world(model: Model, time: float) -> tuple[Array, Array]:
+    """Rotation (3, 3) palm <- world and the palm's position (3,) in the world at a time."""
+    sample = int(np.argmin(np.abs(model.schedule.samples - time)))
+    return pin.Quaternion(*model.palm_quaternion[sample]).matrix().T, model.palm_position[sample]
+
+
+def target_of(model: Model, floating: Floating) -> Target:
+    """See a floating motion from the palm; contact points are moved onto the object's surface."""
+    schedule, contacts = model.schedule, model.contacts
+    points, normals, forces, centers, needed = [], [], [], [], []
+    for k, sample in enumerate(schedule.keyframe_samples):
+        rotation, position = palm_from_world(model, schedule.keyframes[k])
+        pose = floating.pose[k]
+        turn = rotation @ pin.exp3(pose[3:]) @ pin.Quaternion(*model.reference).matrix()
+        inward = inward_normals(floating.point[k, :contacts], model.capsules)
+        on_surface = on_capsules(floating.point[k, :contacts], model.capsules, inward)
+        center = rotation @ (pose[:3] - position)
+        force = floating.force[sample, :contacts] * floating.active[k, :contacts, None]
+        points.append(on_surface @ turn.T + center)
+        normals.append(inward @ turn.T)
+        forces.append(force @ turn.T)
+        centers.append(center)
+        torque = np.cross(on_surface, force).sum(axis=0)
+        needed.append(np.concatenate([turn @ force.sum(axis=0), turn @ torque]))
+    return Target(
+        times=schedule.keyframes,
+        points=np.array(points),
+        normals=np.array(normals),
+        forces=np.array(forces),
+        needed=np.array(needed),
+        centers=np.array(centers),
+        active=floating.active[:, :contacts],
+        pose=floating.pose,
+        model=model,
+    )
+
+
+def on_capsules(points: Array, capsules: Array, inward: Array) -> Array:
+    """Points (C, 3) moved along their normals onto capsules (C, 7), object frame."""
+    moved = []
+    for point, capsule, normal in zip(points, capsules, inward, strict=True):
+        along = capsule[3:6] - capsule[:3]
+        squared = float(along @ along)
+        fraction = np.clip((point - capsule[:3]) @ along / squared, 0, 1) if squared else 0.0
+        moved.append(capsule[:3] + fraction * along - capsule[6] * normal)
+    return np.array(moved)

@@ -1,0 +1,50 @@
+"""How far bodies are into each other (eq. 2.20): fingers, object, palm, ground; all in the palm frame."""
+
+from __future__ import annotations
+
+import casadi as ca
+from casadi import SX
+
+from casadi_hands.geometry import point_disc_distance, segment_distance
+
+
+def links_and_object(ends: list[tuple[SX, SX]], radius: SX, primitives: SX) -> SX:
+    """Distances (L·K,) between the surfaces of a finger's links and the object's primitives.
+
+    Args:
+        ends: both ends (3,) of each link's axis.
+        radius: of the links.
+        primitives: (7, K) start, end and radius.
+    """
+    return ca.vertcat(
+        *[
+            segment_distance(start, end, primitives[:3, k], primitives[3:6, k]) - radius - primitives[6, k]
+            for start, end in ends
+            for k in range(primitives.shape[1])
+        ]
+    )
+
+
+def links_and_palm(ends: list[tuple[SX, SX]], radius: SX, palm_radius: SX) -> SX:
+    """Distances of links from the palm: the first by its far end, the others by both ends and the middle."""
+    points = [ends[0][1]]
+    for start, end in ends[1:]:
+        points += [(start + end) / 2, end]
+    return ca.vertcat(*[point_disc_distance(point, palm_radius) - radius for point in points])
+
+
+def links_and_ground(ends: list[tuple[SX, SX]], radius: SX, up: SX, height: SX) -> SX:
+    """Heights (L + 1,) of links above the ground, whose normal is ``up`` and whose points p have up·p = height."""
+    points = [ends[0][0], *[end for _, end in ends]]
+    return ca.vertcat(*[ca.dot(up, point) - height - radius for point in points])
+
+
+def links_and_links(ends: list[tuple[SX, SX]], others: list[tuple[SX, SX]], radius: SX) -> SX:
+    """Distances (L·M,) between the links of two fingers of one link radius."""
+    return ca.vertcat(*[segment_distance(*a, *b) - 2 * radius for a in ends for b in others])
+
+
+def links_of_one(ends: list[tuple[SX, SX]], radius: SX) -> SX:
+    """Distances between links of one finger that are not neighbours."""
+    pairs = [(ends[i], ends[j]) for i in range(len(ends)) for j in range(i + 2, len(ends))]
+    return ca.vertcat(*[segment_distance(*a, *b) - 2 * radius for a, b in pairs]) if pairs else SX.zeros(0, 1)

@@ -1,0 +1,72 @@
+"""Terms of one finger: where it reaches, what it can push, how it is built."""
+
+from __future__ import annotations
+
+import casadi as ca
+from casadi import SX
+
+from casadi_hands.geometry import norm, penalty_spline
+
+NULL_SPACE_DAMPING = 0.02  # of the Jacobian's singular values, lengths per rad: the lever below which a joint does not push
+_TORQUE_DAMPING = 1e-3  # λ of eq. A.5
+
+
+def null_space_force(jacobian: SX, force: SX, damping: float = NULL_SPACE_DAMPING) -> SX:
+    """The part (3,) of a force that no joint torque can supply (eq. 2.23, A.1), damped instead of by SVD.
+
+    Args:
+        jacobian: (3, n) of the contact point, lengths/rad.
+        force: (3,) in the same frame, m·g.
+        damping: λ, lengths/rad; also counts a finger stretched until its joints have no lever.
+    """
+    n = jacobian.shape[1]
+    normal_matrix = ca.mtimes(jacobian.T, jacobian) + damping**2 * SX.eye(n)
+    return force - ca.mtimes(jacobian, solve_positive(normal_matrix, ca.mtimes(jacobian.T, force)))
+
+
+def null_space(jacobian: SX, force: SX) -> SX:
+    """Size of ``null_space_force`` in m·g, rounded off at zero; a plain value."""
+    return ca.sqrt(ca.sumsqr(null_space_force(jacobian, force)) + 1e-4)
+
+
+def joint_torques(jacobian: SX, force: SX) -> SX:
+    """α (n,) of eq. A.5, written without dividing by the squared levers.
+
+    With D the squared column norms of the Jacobian, α = D (JᵀJ + λ²D² + 1e-8)⁻¹ Jᵀ f.
+    """
+    squared = ca.sum1(jacobian**2).T
+    matrix = ca.mtimes(jacobian.T, jacobian) + ca.diag(_TORQUE_DAMPING**2 * squared**2 + 1e-8)
+    return squared * solve_positive(matrix, ca.mtimes(jacobian.T, force))
+
+
+def solve_positive(matrix: SX, right: SX) -> SX:
+    """Solve a small symmetric positive definite system by LDLᵀ written out, without pivots or branches."""
+    n = matrix.shape[0]
+    lower, diagonal = SX.eye(n), SX.zeros(n, 1)
+    for j in range(n):
+        diagonal[j] = matrix[j, j] - sum((lower[j, k] ** 2 * diagonal[k] for k in range(j)), SX(0))
+        for i in range(j + 1, n):
+            inner = sum((lower[i, k] * lower[j, k] * diagonal[k] for k in range(j)), SX(0))
+            lower[i, j] = (matrix[i, j] - inner) / diagonal[j]
+    y = SX.zeros(n, 1)
+    for i in range(n):
+        y[i] = right[i] - sum((lower[i, k] * y[k] for k in range(i)), SX(0))
+    x = y / diagonal
+    for i in reversed(range(n)):
+        x[i] = x[i] - sum((lower[k, i] * x[k] for k in range(i + 1, n)), SX(0))
+    return x
+
+
+def beyond_limits(value: SX, lower: SX, upper: SX, rounding: float = 1e-3) -> SX:
+    """g(value - upper) + g(lower - value), elementwise (eq. 2.22, 2.27); plain values."""
+    return penalty_spline(value - upper, rounding) + penalty_spline(lower - value, rounding)
+
+
+def off_palm(base: SX, palm_radius: SX) -> SX:
+    """How far a base (2,) on the palm's plane is beyond its rim, as g (eq. 2.25); a plain value."""
+    return penalty_spline(norm(base, 1e-6) - palm_radius, 1e-3)
+
+
+def tip_acceleration(before: SX, now: SX, after: SX, step: SX) -> SX:
+    """Second difference (3,) of the fingertip's position, lengths/s² (eq. 2.26)."""
+    return (after - 2 * now + before) / step**2
