@@ -71,7 +71,7 @@ def _turns(task: Task) -> Iterator[Problem]:
     first = task.motion[0].rotation.vector
     for number, goal in enumerate(task.motion):
         vector = goal.rotation.vector
-        if np.linalg.norm(np.cross(first, vector)) > 1e-9 * max(np.linalg.norm(first) * np.linalg.norm(vector), 1e-300):
+        if np.linalg.norm(np.cross(first, vector)) > 1e-9 * np.linalg.norm(first) * np.linalg.norm(vector):
             continue
         turn = float(np.degrees(np.linalg.norm(vector - first)))
         if turn > _LARGEST_TURN * (1 + 1e-9):

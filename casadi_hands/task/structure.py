@@ -29,8 +29,9 @@ def description_at(path: tuple[str | int, ...]) -> str:
 
 
 def paths_of(name: str) -> list[str]:
-    """Every place in the file where a field of this name exists, as dotted paths."""
-    return [path for path, _, _ in walk(Task) if path.split(".")[-1] == name]
+    """Places at most two names deep in the file where a field of this name exists, as dotted paths."""
+    paths = [(path, path.split(".")) for path, _, _ in walk(Task)]
+    return [path for path, names in paths if names[-1] == name and len(names) <= 2]
 
 
 def fields_of(section: type[Section]) -> dict[str, FieldInfo]:

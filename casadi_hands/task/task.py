@@ -35,7 +35,7 @@ class Task(Section):
         default=None, description="The point of the object that draws, m, object frame; drawing tasks only."
     )
     duration: Positive = Field(
-        default_factory=lambda data: data["motion"][-1].at,
+        default_factory=lambda data: max(goal.at for goal in data["motion"]),
         description="How long the motion takes, s.",
         json_schema_extra={"default": "the last goal's time"},
     )

@@ -54,6 +54,7 @@ class FloatingWeights(_WeightTable):
     object_angular_acceleration: NonNegative = Field(default=1.0, description="Object's rate of spin (eq. 2.15).")
     palm_clearance: NonNegative = Field(default=100.0, description="Object and palm overlapping (3.2.3).")
     contact_patch: NonNegative = Field(default=1.0, description="Contacts away from where the task put them.")
+    path: NonNegative = Field(default=3.0, description="Keyframes off the straight way between goals.")
     friction_sharpness: Positive = Field(
         default=5.0, description="Sharpness of the friction cone, not a weight (eq. 2.8)."
     )

@@ -7,7 +7,6 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from ruamel.yaml import YAML
-from ruamel.yaml.comments import CommentedBase
 from ruamel.yaml.constructor import DuplicateKeyError
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
@@ -37,7 +36,7 @@ class TaskFile:
         """
         self.source = source
         self._tree = _parse(text, source)
-        self.data: dict[str, Any] = _plain(self._tree, source, ())
+        self.data: dict[str, Any] = _plain(self._tree)
 
     def line(self, path: Path) -> int:
         """Line of the value at ``path``, from 1; of the deepest part of the path that the file has."""
@@ -89,22 +88,18 @@ def _parse(text: str, source: str) -> Any:
     if tree is None:
         raise TaskError(f"{source}: empty; a task file needs at least object, palm, motion and fingers")
     if not isinstance(tree, dict):
-        raise TaskError(
-            f"{source}:1: given {type(tree).__name__.removeprefix('Commented').lower()}; "
-            "a task file is a mapping of fields such as object, palm, motion and fingers"
-        )
+        given = "a list" if isinstance(tree, list) else repr(_plain(tree))
+        wanted = "a task file is a mapping of fields such as object, palm, motion and fingers"
+        raise TaskError(f"{source}:1: given {given}; {wanted}")
     return tree
 
 
-def _plain(node: Any, source: str, parents: tuple[int, ...]) -> Any:
+def _plain(node: Any) -> Any:
     """Copy of a parsed tree in Python's own types."""
-    if isinstance(node, CommentedBase) and id(node) in parents:
-        raise TaskError(f"{source}: an anchor contains itself; write the values out")
-    parents = (*parents, id(node))
     if isinstance(node, dict):
-        return {str(name): _plain(value, source, parents) for name, value in node.items()}
+        return {str(name): _plain(value) for name, value in node.items()}
     if isinstance(node, list):
-        return [_plain(value, source, parents) for value in node]
+        return [_plain(value) for value in node]
     for kind in (bool, int, float, str):
         if isinstance(node, kind):
             return kind(node)
