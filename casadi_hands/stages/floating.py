@@ -11,9 +11,16 @@ from numpy.typing import NDArray
 
 from casadi_hands.motion import linear
 from casadi_hands.nlp import Options, Problem, Solution, Solver
-from casadi_hands.stages.model import Model
-from casadi_hands.stages.object_side import bind_object, declare_object, object_parameters, sizes, term_weights
 from casadi_hands.stages.grasp import least_squares_forces, passes_gate
+from casadi_hands.stages.model import Model
+from casadi_hands.stages.object_side import (
+    bind_object,
+    declare_object,
+    object_parameters,
+    sizes,
+    straight_path,
+    term_weights,
+)
 
 Array = NDArray[np.float64]
 THRESHOLDS = (0.1, 0.2, 0.3)
@@ -62,9 +69,7 @@ class FloatingStage:
         """Goals interpolated, contacts fixed in the object, forces of a least-squares grasp."""
         model, schedule = self.model, self.model.schedule
         keyframes, samples, contacts = sizes(model)
-        positions = model.goal_positions if model.tool is None else model.goal_positions - model.tool
-        goals = np.hstack([positions, model.goal_vectors])
-        pose = linear(schedule.keyframes[list(schedule.goals)], schedule.keyframes) @ goals
+        pose = straight_path(model)
         patches = model.patches if model.ground is None else np.vstack([model.patches, model.ground.patch])
         turned = (linear(schedule.keyframes, schedule.samples) @ pose)[:, 3:]
         reference = pin.Quaternion(*model.reference).matrix()

@@ -131,6 +131,17 @@ def goal_point() -> Kernel:
     return kernel
 
 
+def straight_path() -> Kernel:
+    """One keyframe's distance (6,) from the straight way between goals: lengths and rad.
+
+    Without it the object wanders where no goal holds it, to wherever forces are smallest.
+    """
+    kernel = Kernel("straight_path")
+    pose, straight = kernel.variable("pose", 6), kernel.parameter("straight", 6)
+    kernel.cost("path", pose - straight)
+    return kernel
+
+
 def capsule_in(pose_position: SX, rotation: SX, capsule: SX) -> tuple[SX, SX]:
     """Both ends (3,) of a primitive's axis, moved by a pose."""
     return pose_position + ca.mtimes(rotation, capsule[:3]), pose_position + ca.mtimes(rotation, capsule[3:6])

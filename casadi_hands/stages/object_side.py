@@ -16,6 +16,7 @@ from casadi_hands.stages.model import Model
 Array = NDArray[np.float64]
 NO_GROUND = -1e3  # a height no object reaches, half extents
 CLEARANCE = 0.02  # of object and palm, half extents
+GOAL_TOLERANCE = 5e-4  # half extents and rad, each coordinate: the task's cost alone gives way to slow accelerations
 MOST_FORCE = 20.0  # m·g, a bound on each component of a contact force
 MOST_TURN = 5.6  # rad, up to where the exponential map's coordinates are used
 
@@ -59,8 +60,7 @@ def declare_object(problem: Problem, model: Model) -> ObjectSide:
     """Declare ``pose`` (N, 6), ``point`` (N, 3C), ``force`` (S, 3C), ``activity`` (N, C), ``force_perturbed``."""
     schedule = model.schedule
     keyframes, samples, contacts = sizes(model)
-    widest = np.array([np.inf] * 3 + [MOST_TURN] * 3)
-    pose = problem.variable("pose", (keyframes, 6), -widest, widest)
+    pose = problem.variable("pose", (keyframes, 6), *pose_bounds(model))
     point = problem.variable("point", (keyframes, 3 * contacts))
     force = problem.variable("force", (samples, 3 * contacts), -MOST_FORCE, MOST_FORCE)
     activity = problem.variable("activity", (keyframes, contacts), 0, 1)
@@ -141,6 +141,8 @@ def _bind_goals(problem: Problem, model: Model, side: ObjectSide) -> None:
         targets, vectors = problem.parameter("targets", shape), problem.parameter("vectors", shape)
         rows = side.keyframe_pose.take(model.schedule.goals)
         problem.bind(kernels.goal_pose(), [rows], [p["reference"], targets, vectors])
+    straight = problem.parameter("straight", (sizes(model)[0], 6))
+    problem.bind(kernels.straight_path(), [side.keyframe_pose], [straight])
 
 
 def _bind_clearance(problem: Problem, model: Model, side: ObjectSide) -> None:
@@ -152,6 +154,24 @@ def _bind_clearance(problem: Problem, model: Model, side: ObjectSide) -> None:
     for i in range(len(model.primitives)):
         parameters = [p["reference"], primitives[i : i + 1], *palm, radius, p["ground_height"], p["clearance"]]
         problem.bind(kernel, [side.pose[1]], parameters)
+
+
+def straight_path(model: Model) -> Array:
+    """Poses (N, 6) at the keyframes on the straight way between goals; a drawing's object stays upright."""
+    positions = model.goal_positions if model.tool is None else model.goal_positions - model.tool
+    keyframes = model.schedule.keyframes
+    return linear(keyframes[list(model.schedule.goals)], keyframes) @ np.hstack([positions, model.goal_vectors])
+
+
+def pose_bounds(model: Model) -> tuple[Array, Array]:
+    """Box bounds (N, 6) of the keyframe poses: close to the goals, else as far as coordinates serve."""
+    widest = np.tile([np.inf] * 3 + [MOST_TURN] * 3, (sizes(model)[0], 1))
+    lower, upper = -widest, widest
+    if model.tool is None:
+        goals = np.hstack([model.goal_positions, model.goal_vectors])
+        chosen = list(model.schedule.goals)
+        lower[chosen], upper[chosen] = goals - GOAL_TOLERANCE, goals + GOAL_TOLERANCE
+    return lower, upper
 
 
 def object_parameters(model: Model) -> dict[str, Array | float]:
@@ -174,6 +194,7 @@ def object_parameters(model: Model) -> dict[str, Array | float]:
         "palm_radius": model.palm_radius,
         "primitives": model.primitives,
         "targets": model.goal_positions,
+        "straight": straight_path(model),
     }
     if model.tool is not None:
         values["tool"] = model.tool
