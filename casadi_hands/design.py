@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -122,3 +123,31 @@ class Design:
     certificate: dict[str, dict[str, Any]] = field(default_factory=dict)
     stages: list[dict[str, Any]] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=dict)
+
+    def save(self, directory: str | Path) -> None:
+        """Write the result folder; a partial design writes the files for which there is something to write.
+
+        Args:
+            directory: made if it does not exist; files of an earlier design in it are replaced.
+
+        Raises:
+            DesignError: the folder cannot be written, or the design holds what cannot be.
+        """
+        # The writers know the data types above, not the other way round; hence the late import.
+        from casadi_hands.export.folder import save_design
+
+        save_design(self, Path(directory))
+
+    @classmethod
+    def load(cls, directory: str | Path) -> Design:
+        """Read a result folder that `save` wrote.
+
+        Args:
+            directory: the folder.
+
+        Raises:
+            DesignError: there is no such folder, it is incomplete, or of another format.
+        """
+        from casadi_hands.export.folder import load_design
+
+        return load_design(Path(directory))

@@ -1,0 +1,111 @@
+"""The result folder: every file of a design, written and read back."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from casadi_hands.design import Design
+from casadi_hands.errors import DesignError, TaskError
+from casadi_hands.export.arrays import load_motion, save_motion
+from casadi_hands.export.mjcf import scene_mjcf
+from casadi_hands.export.record import FORMAT, STATUSES, design_record, hand_from_record, record_text
+from casadi_hands.export.urdf import hand_urdf, object_urdf
+from casadi_hands.task import load_task, task_to_yaml
+from casadi_hands.view.page import write_page
+
+_FILES = ("task.yaml", "hand.urdf", "object.urdf", "scene.xml", "motion.npz", "result.json", "viewer.html")
+_ENTRIES = ("status", "reason", "hand", "samples", "costs", "certificate", "stages", "seconds")
+
+
+def save_design(design: Design, directory: Path) -> None:
+    """Write a design's folder; of a partial design, the files for which there is something to write.
+
+    Files of an earlier design in the folder are replaced or removed. ``result.json`` comes last, so a folder that has
+    one is complete.
+
+    Args:
+        design: whole or partial (hand or motion None).
+        directory: made if it does not exist.
+
+    Raises:
+        DesignError: the folder cannot be written, or the design holds what cannot be.
+    """
+    if design.status not in STATUSES:
+        raise DesignError(f"a design's status is one of {', '.join(STATUSES)}, not {design.status!r}")
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        for name in _FILES:
+            (directory / name).unlink(missing_ok=True)
+        _write(design, directory)
+    except OSError as error:
+        raise DesignError(f"{directory}: cannot write the design here: {error}") from error
+
+
+def _write(design: Design, directory: Path) -> None:
+    texts = {"task.yaml": task_to_yaml(design.task), "object.urdf": object_urdf(design.task)}
+    if design.hand is not None:
+        texts["hand.urdf"] = hand_urdf(design.hand)
+        if design.motion is not None:
+            texts["scene.xml"] = scene_mjcf(design.task, design.hand, design.motion)
+    for name, text in texts.items():
+        (directory / name).write_text(text, encoding="utf-8")
+    if design.motion is not None:
+        save_motion(design.motion, directory / "motion.npz")
+    write_page(design, directory / "viewer.html")
+    (directory / "result.json").write_text(record_text(design_record(design)), encoding="utf-8")
+
+
+def load_design(directory: Path) -> Design:
+    """Read a design's folder.
+
+    Args:
+        directory: what `save_design` wrote.
+
+    Raises:
+        DesignError: there is no such folder, it is incomplete, or of another format.
+    """
+    record = _read_record(directory)
+    try:
+        task = load_task(directory / "task.yaml")
+    except TaskError as error:
+        raise DesignError(f"{directory}: the design's task cannot be read: {error}") from error
+    try:
+        hand = hand_from_record(record)
+    except DesignError as error:
+        raise DesignError(f"{directory / 'result.json'}: {error}") from error
+    motion = load_motion(directory / "motion.npz") if record["samples"] is not None else None
+    if hand is not None and motion is not None and motion.joint_names != hand.joint_names:
+        raise DesignError(f"{directory}: motion.npz moves other joints than those of the hand in result.json")
+    return Design(
+        task=task,
+        status=record["status"],
+        reason=record["reason"],
+        hand=hand,
+        motion=motion,
+        costs=record["costs"],
+        certificate=record["certificate"],
+        stages=record["stages"],
+        seconds=record["seconds"],
+    )
+
+
+def _read_record(directory: Path) -> dict[str, Any]:
+    """The folder's ``result.json``, of the format this version reads and with the entries a design needs."""
+    if not directory.is_dir():
+        raise DesignError(f"{directory}: there is no such folder; give one that `casadi-hands solve` wrote")
+    path = directory / "result.json"
+    if not path.exists():
+        raise DesignError(f"{directory}: no result.json, so this is not the folder of a finished design")
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise DesignError(f"{path}: cannot be read: {error}") from error
+    if not isinstance(record, dict) or record.get("format") != FORMAT:
+        given = record.get("format") if isinstance(record, dict) else None
+        raise DesignError(f"{path}: its format is {given!r}; this version reads format {FORMAT}")
+    missing = [name for name in _ENTRIES if name not in record]
+    if missing:
+        raise DesignError(f"{path}: lacks {', '.join(missing)}")
+    return record

@@ -1,0 +1,245 @@
+"""The whole scene as MJCF for MuJoCo: hand on its base, object free, ground, one position actuator a joint.
+
+Choices a reader of the file should know:
+
+- **Palm.** A palm that stands still is a fixed body. A palm that moves is a free body welded to the mocap body
+  ``palm_target``: whoever replays the motion moves the target. A mocap palm alone would have no velocity in the
+  solver's eyes, and friction would hold the object back.
+- **Contact.** Elliptic cones, four dimensions. The task's friction holds wherever the object touches the hand, the
+  ground's wherever anything touches the ground. Fingertips are soft: torsional friction is that of a patch with 0.3
+  of the link's radius, (2/3)·μ·patch, and the contact gives over 2 % of the object's size. Creep, an artefact of
+  MuJoCo's regularised friction, is held down by ``impratio`` and the no-slip pass.
+- **Motors.** See `casadi_hands.export.motors`; torque is limited to the hand's effort. The hand carries its own weight
+  (``gravcomp``), as a controller that knows its hand does. Targets are not clamped, so that a feed-forward torque can
+  be given as an offset of the target.
+- **Collisions.** Neighbours in a chain, the palm and first links among them, do not collide; all else does.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+from xml.etree.ElementTree import Element, SubElement
+
+import numpy as np
+
+from casadi_hands.export.inertia import Inertial, link_inertial, palm_inertial
+from casadi_hands.export.markup import (
+    GROUND_COLOR,
+    OBJECT_COLOR,
+    PALM_COLOR,
+    Color,
+    document,
+    finger_color,
+    number,
+    numbers,
+)
+from casadi_hands.export.motors import Motor, joint_motors
+
+if TYPE_CHECKING:
+    from casadi_hands.design import Finger, Hand, Motion
+    from casadi_hands.task import Ground, Task
+
+_TIME_STEP = 0.001  # s
+_PATCH = 0.3  # radius of a fingertip's contact patch, of the link's radius
+_SOFTNESS = 0.02  # depth over which a contact stiffens, of the object's half extent
+_STILL = 1e-9  # a palm that moves less, relative to its size (or in its quaternion), stands still
+
+
+def scene_mjcf(task: Task, hand: Hand, motion: Motion) -> str:
+    """The scene as MJCF text, with the keyframe ``start`` at the motion's first sample.
+
+    Args:
+        task: gives the object, gravity, friction, ground.
+        hand: the designed hand.
+        motion: its first sample places palm, joints and object; it also says whether the palm moves.
+    """
+    moves = _palm_moves(hand, motion)
+    motors = joint_motors(task, hand)
+    root = Element("mujoco", model=task.name)
+    _add_settings(root, task)
+    world = SubElement(root, "worldbody")
+    SubElement(world, "light", pos=numbers(motion.object_position[0] + [0, 0, 20 * task.object.half_extent]))
+    if task.ground is not None:
+        _add_ground(world, task.ground, task.object.half_extent)
+    _add_hand(world, task, hand, motion, motors, moves)
+    _add_object(world, task, hand, motion)
+    contact = SubElement(root, "contact")
+    for first, second in neighbours(hand):
+        SubElement(contact, "exclude", body1=first, body2=second)
+    if moves:
+        weld = {"body1": "palm_target", "body2": "palm", "solref": number(2.5 * _TIME_STEP) + " 1"}
+        SubElement(SubElement(root, "equality"), "weld", weld)
+    _add_actuators(root, hand, motors)
+    _add_start(root, motion, moves)
+    return document(root)
+
+
+def neighbours(hand: Hand) -> tuple[tuple[str, str], ...]:
+    """Pairs of links that share a joint, by name, from the palm outwards."""
+    pairs = []
+    for i, finger in enumerate(hand.fingers):
+        chain = ["palm", *(f"finger{i}_link{j}" for j in range(len(finger.links)))]
+        pairs += list(pairwise(chain))
+    return tuple(pairs)
+
+
+def _palm_moves(hand: Hand, motion: Motion) -> bool:
+    """Whether the palm's pose changes over the motion."""
+    shift = np.abs(motion.base_position - motion.base_position[0]).max() / hand.palm_radius
+    # q and -q are one orientation, so compare the size of the inner product with 1.
+    turn = 1 - np.abs(motion.base_orientation @ motion.base_orientation[0]).min()
+    return bool(shift > _STILL or turn > _STILL)
+
+
+def _add_settings(root: Element, task: Task) -> None:
+    """Add solver options and the defaults of contacts."""
+    SubElement(root, "compiler", angle="radian")
+    SubElement(
+        root,
+        "option",
+        timestep=number(_TIME_STEP),
+        gravity=numbers(task.gravity),
+        integrator="implicitfast",
+        cone="elliptic",
+        impratio="10",
+        noslip_iterations="5",
+    )
+    extent = 8 * task.object.half_extent
+    center = task.palm.position
+    SubElement(root, "statistic", extent=number(extent), center=numbers(center), meansize=number(extent / 20))
+    geom = {"condim": "4", "solref": "0.01 1", "solimp": f"0.9 0.95 {number(_SOFTNESS * task.object.half_extent)}"}
+    SubElement(SubElement(root, "default"), "geom", geom)
+
+
+def _friction(task: Task, hand: Hand, coefficient: float) -> str:
+    """Sliding, torsional and rolling coefficient of a contact with a soft fingertip."""
+    radius = max((link.radius for finger in hand.fingers for link in finger.links), default=0.0)
+    return numbers((coefficient, 2 / 3 * coefficient * _PATCH * radius, 0.0))
+
+
+def _add_ground(world: Element, ground: Ground, spacing: float) -> None:
+    """Add the ground plane; its friction takes precedence over that of whatever touches it.
+
+    Its lines are drawn `spacing` (m) apart.
+    """
+    SubElement(
+        world,
+        "geom",
+        name="ground",
+        type="plane",
+        pos=numbers((0.0, 0.0, ground.height)),
+        size=numbers((0.0, 0.0, spacing)),
+        friction=numbers((ground.friction, 0.0, 0.0)),
+        condim="3",
+        priority="2",
+        rgba=numbers((*GROUND_COLOR, 1.0)),
+    )
+
+
+def _add_object(world: Element, task: Task, hand: Hand, motion: Motion) -> None:
+    """Add the free object at its first pose; its friction takes precedence over the hand's."""
+    start = {"pos": numbers(motion.object_position[0]), "quat": numbers(motion.object_orientation[0])}
+    body = SubElement(world, "body", start, name="object")
+    SubElement(body, "freejoint", name="object")
+    item = task.object
+    _add_inertial(body, Inertial(item.mass, np.asarray(item.center_of_mass), np.asarray(item.inertia)))
+    for k, shape in enumerate(item.shapes):
+        geom = {"name": f"object{k}", "priority": "1", "friction": _friction(task, hand, task.friction)}
+        _add_capsule(body, geom, *shape.segment, shape.radius, OBJECT_COLOR)
+
+
+def _add_hand(world: Element, task: Task, hand: Hand, motion: Motion, motors: tuple[Motor, ...], moves: bool) -> None:
+    """Add the palm at its first pose and the fingers on it."""
+    start = {"pos": numbers(motion.base_position[0]), "quat": numbers(motion.base_orientation[0])}
+    if moves:
+        SubElement(world, "body", start, name="palm_target", mocap="true")
+    palm = SubElement(world, "body", start, name="palm", gravcomp="1")
+    if moves:
+        SubElement(palm, "freejoint", name="palm")
+    _add_inertial(palm, palm_inertial(hand))
+    friction = _friction(task, hand, task.friction)
+    SubElement(
+        palm,
+        "geom",
+        name="palm",
+        type="cylinder",
+        pos=numbers((0.0, 0.0, -hand.palm_thickness / 2)),
+        size=numbers((hand.palm_radius, hand.palm_thickness / 2)),
+        friction=friction,
+        rgba=numbers((*PALM_COLOR, 1.0)),
+    )
+    remaining = iter(motors)
+    for i, finger in enumerate(hand.fingers):
+        _add_finger(palm, hand, i, finger, [next(remaining) for _ in finger.links], friction)
+
+
+def _add_finger(palm: Element, hand: Hand, i: int, finger: Finger, motors: list[Motor], friction: str) -> None:
+    """Add one finger as a chain of nested bodies; `i` is its place in the hand."""
+    parent, origin = palm, np.asarray(finger.base)
+    for j, (link, motor) in enumerate(zip(finger.links, motors, strict=True)):
+        name = f"finger{i}_link{j}"
+        body = SubElement(parent, "body", name=name, pos=numbers(origin), gravcomp="1")
+        SubElement(
+            body,
+            "joint",
+            name=f"finger{i}_joint{j}",
+            axis=numbers(link.axis),
+            limited="true",
+            range=numbers((hand.joint_lower, hand.joint_upper)),
+            armature=number(motor.armature),
+        )
+        _add_inertial(body, link_inertial(link, hand.density))
+        tip = np.array([0.0, 0.0, link.length])
+        _add_capsule(body, {"name": name, "friction": friction}, np.zeros(3), tip, link.radius, finger_color(i))
+        parent, origin = body, tip
+
+
+def _add_inertial(body: Element, inertial: Inertial) -> None:
+    """Add mass, centre of mass and inertia."""
+    tensor = inertial.inertia
+    full = (tensor[0, 0], tensor[1, 1], tensor[2, 2], tensor[0, 1], tensor[0, 2], tensor[1, 2])
+    SubElement(body, "inertial", pos=numbers(inertial.center), mass=number(inertial.mass), fullinertia=numbers(full))
+
+
+def _add_capsule(
+    body: Element,
+    attributes: dict[str, str],
+    start: np.ndarray,
+    end: np.ndarray,
+    radius: float,
+    color: Color,
+) -> None:
+    """Add a capsule geom, or a sphere where start and end coincide."""
+    attributes = {**attributes, "rgba": numbers((*color, 1.0))}
+    if np.array_equal(start, end):
+        SubElement(body, "geom", attributes, type="sphere", pos=numbers(start), size=number(radius))
+    else:
+        SubElement(body, "geom", attributes, type="capsule", fromto=numbers((*start, *end)), size=number(radius))
+
+
+def _add_actuators(root: Element, hand: Hand, motors: tuple[Motor, ...]) -> None:
+    """Add a position actuator for every joint, named as the joint."""
+    actuators = SubElement(root, "actuator")
+    for name, motor in zip(hand.joint_names, motors, strict=True):
+        SubElement(
+            actuators,
+            "position",
+            name=name,
+            joint=name,
+            kp=number(motor.stiffness),
+            kv=number(motor.damping),
+            forcelimited="true",
+            forcerange=numbers((-hand.effort, hand.effort)),
+        )
+
+
+def _add_start(root: Element, motion: Motion, moves: bool) -> None:
+    """Add the keyframe ``start``; MuJoCo orders coordinates as the bodies stand in the file."""
+    base = (*motion.base_position[0], *motion.base_orientation[0]) if moves else ()
+    item = (*motion.object_position[0], *motion.object_orientation[0])
+    key = {"name": "start", "qpos": numbers((*base, *motion.joint_angles[0], *item))}
+    key["ctrl"] = numbers(motion.joint_angles[0])
+    if moves:
+        key["mpos"], key["mquat"] = numbers(base[:3]), numbers(base[3:])
+    SubElement(SubElement(root, "keyframe"), "key", key)

@@ -1,0 +1,167 @@
+"""``result.json``: the structure, the costs, the certificate and how they came about."""
+
+from __future__ import annotations
+
+import json
+from importlib.metadata import PackageNotFoundError, version
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from casadi_hands.design import Design, Finger, Hand, Link
+from casadi_hands.errors import DesignError
+
+if TYPE_CHECKING:
+    from casadi_hands.task import Task
+
+FORMAT = 1
+STATUSES = ("certified", "feasible", "failed")
+_PACKAGES = ("casadi-hands", "casadi", "pin", "coal", "mujoco", "numpy")
+
+
+def design_record(design: Design) -> dict[str, Any]:
+    """All of ``result.json`` as plain lists and dictionaries; a number that is not finite becomes None.
+
+    Args:
+        design: whole or partial.
+    """
+    task = design.task
+    record = {
+        "format": FORMAT,
+        "status": design.status,
+        "reason": design.reason,
+        "task": task.name,
+        "object": {
+            "mass": task.object.mass,
+            "inertia": np.asarray(task.object.inertia),
+            "shapes": [_shape(shape) for shape in task.object.shapes],
+        },
+        "friction": task.friction,
+        "gravity": task.gravity,
+        "ground_height": task.ground.height if task.ground else None,
+        "ground_friction": task.ground.friction if task.ground else None,
+        "goals": _goals(task),
+        "hand": _hand(design.hand) if design.hand else None,
+        "degrees_of_freedom": design.hand.degrees_of_freedom if design.hand else None,
+        "samples": len(design.motion.time) if design.motion else None,
+        "costs": design.costs,
+        "certificate": design.certificate,
+        "stages": design.stages,
+        "seconds": design.seconds,
+        "versions": _versions(),
+    }
+    plain: dict[str, Any] = _plain(record)
+    return plain
+
+
+def record_text(record: dict[str, Any]) -> str:
+    """The record as indented JSON; strict, so that any reader of JSON can read it."""
+    return json.dumps(record, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def hand_from_record(record: dict[str, Any]) -> Hand | None:
+    """The hand of a record, or None where no stage has designed one.
+
+    Args:
+        record: what `design_record` returned, read back from JSON.
+
+    Raises:
+        DesignError: an entry is missing or of the wrong kind.
+    """
+    entry = record.get("hand")
+    if entry is None:
+        return None
+    try:
+        return Hand(
+            palm_radius=float(entry["palm"]["radius"]),
+            palm_thickness=float(entry["palm"]["thickness"]),
+            fingers=tuple(
+                Finger(
+                    name=str(finger["name"]),
+                    base=_vector(finger["base"]),
+                    links=tuple(
+                        Link(float(link["length"]), float(link["radius"]), _vector(link["axis"]))
+                        for link in finger["links"]
+                    ),
+                )
+                for finger in entry["fingers"]
+            ),
+            **{name: float(entry[name]) for name in _HAND_NUMBERS},
+        )
+    except KeyError as error:
+        raise DesignError(f"the hand lacks {error}") from error
+    except (TypeError, ValueError) as error:
+        raise DesignError(f"the hand cannot be read: {error}") from error
+
+
+_HAND_NUMBERS = ("joint_lower", "joint_upper", "effort", "velocity", "density")
+
+
+def _hand(hand: Hand) -> dict[str, Any]:
+    return {
+        "palm": {"radius": hand.palm_radius, "thickness": hand.palm_thickness},
+        "fingers": [
+            {
+                "name": finger.name,
+                "base": finger.base,
+                "links": [{"length": link.length, "radius": link.radius, "axis": link.axis} for link in finger.links],
+            }
+            for finger in hand.fingers
+        ],
+        **{name: getattr(hand, name) for name in _HAND_NUMBERS},
+    }
+
+
+def _shape(shape: Any) -> dict[str, Any]:
+    start, end = shape.segment
+    if np.array_equal(start, end):
+        return {"type": "sphere", "center": start, "radius": shape.radius}
+    return {"type": "capsule", "start": start, "end": end, "radius": shape.radius}
+
+
+def _goals(task: Task) -> list[dict[str, Any]]:
+    if task.tool is not None:
+        return [{"time": goal.at, "point": goal.tool_at, "tool_point": task.tool} for goal in task.motion]
+    return [
+        {"time": goal.at, "position": goal.position, "orientation": rotation_quaternion(goal.rotation.vector)}
+        for goal in task.motion
+    ]
+
+
+def rotation_quaternion(vector: np.ndarray) -> np.ndarray:
+    """Unit quaternion (4,), [w, x, y, z], of a rotation vector (3,), rad."""
+    angle = float(np.linalg.norm(vector))
+    # np.sinc(x) is sin(πx)/(πx), defined at 0.
+    return np.array([np.cos(angle / 2), *(np.sinc(angle / (2 * np.pi)) / 2 * np.asarray(vector))])
+
+
+def _vector(values: Any) -> tuple[float, float, float]:
+    x, y, z = (float(value) for value in values)
+    return (x, y, z)
+
+
+def _plain(value: Any) -> Any:
+    """The value in the types of JSON; arrays become lists, a number that is not finite None."""
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    if isinstance(value, float):
+        return value if isfinite(value) else None
+    return value
+
+
+def _versions() -> dict[str, str]:
+    """Versions of this package and of its numerical dependencies, of those installed."""
+    found = {}
+    for package in _PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return found

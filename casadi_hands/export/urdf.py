@@ -1,0 +1,134 @@
+"""The hand and the object as URDF, with every shape a sphere or a cylinder so that no mesh file is needed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+from xml.etree.ElementTree import Element, SubElement
+
+import numpy as np
+
+from casadi_hands.export.inertia import Inertial, link_inertial, palm_inertial
+from casadi_hands.export.markup import (
+    OBJECT_COLOR,
+    PALM_COLOR,
+    Color,
+    document,
+    finger_color,
+    joint_color,
+    number,
+    numbers,
+)
+
+if TYPE_CHECKING:
+    from casadi_hands.design import Finger, Hand
+    from casadi_hands.task import Task
+
+
+def hand_urdf(hand: Hand) -> str:
+    """The hand as URDF text.
+
+    Link ``palm`` is the palm frame; ``finger{i}_link{j}`` has its origin at its joint and z along the segment. At
+    zero angles all frames are parallel.
+
+    Args:
+        hand: the designed hand.
+    """
+    robot = _robot("hand")
+    palm = SubElement(robot, "link", name="palm")
+    _add_inertial(palm, palm_inertial(hand))
+    middle = np.array([0.0, 0.0, -hand.palm_thickness / 2])
+    for role in ("visual", "collision"):
+        _add_shape(palm, role, _cylinder(hand.palm_radius, hand.palm_thickness), middle, (0.0, 0.0, 0.0), PALM_COLOR)
+    for i, finger in enumerate(hand.fingers):
+        _add_finger(robot, hand, i, finger)
+    return document(robot)
+
+
+def object_urdf(task: Task) -> str:
+    """The task's object as URDF text: one link ``object`` whose frame is the object frame.
+
+    Args:
+        task: its object gives shapes, mass and inertia.
+    """
+    robot = _robot("object")
+    link = SubElement(robot, "link", name="object")
+    body = task.object
+    _add_inertial(link, Inertial(body.mass, np.asarray(body.center_of_mass), np.asarray(body.inertia)))
+    for shape in body.shapes:
+        _add_capsule(link, *shape.segment, shape.radius, OBJECT_COLOR, OBJECT_COLOR)
+    return document(robot)
+
+
+def _robot(name: str) -> Element:
+    """An empty robot; MuJoCo would otherwise merge the root link into its world and drop its mass."""
+    robot = Element("robot", name=name)
+    SubElement(SubElement(robot, "mujoco"), "compiler", fusestatic="false")
+    return robot
+
+
+def _add_finger(robot: Element, hand: Hand, i: int, finger: Finger) -> None:
+    """Add one finger's joints and links; `i` is its place in the hand."""
+    parent, origin = "palm", np.asarray(finger.base)
+    for j, link in enumerate(finger.links):
+        name = f"finger{i}_link{j}"
+        joint = SubElement(robot, "joint", name=f"finger{i}_joint{j}", type="revolute")
+        SubElement(joint, "parent", link=parent)
+        SubElement(joint, "child", link=name)
+        SubElement(joint, "origin", xyz=numbers(origin), rpy="0 0 0")
+        SubElement(joint, "axis", xyz=numbers(link.axis))
+        SubElement(
+            joint,
+            "limit",
+            lower=number(hand.joint_lower),
+            upper=number(hand.joint_upper),
+            effort=number(hand.effort),
+            velocity=number(hand.velocity),
+        )
+        body = SubElement(robot, "link", name=name)
+        _add_inertial(body, link_inertial(link, hand.density))
+        _add_capsule(body, np.zeros(3), np.array([0.0, 0.0, link.length]), link.radius, finger_color(i), joint_color(i))
+        parent, origin = name, np.array([0.0, 0.0, link.length])
+
+
+def _add_inertial(link: Element, inertial: Inertial) -> None:
+    """Add mass, centre of mass and inertia."""
+    element = SubElement(link, "inertial")
+    SubElement(element, "origin", xyz=numbers(inertial.center), rpy="0 0 0")
+    SubElement(element, "mass", value=number(inertial.mass))
+    axes = "xyz"
+    entries = {f"i{axes[a]}{axes[b]}": number(inertial.inertia[a, b]) for a in range(3) for b in range(a, 3)}
+    SubElement(element, "inertia", entries)
+
+
+def _add_capsule(
+    link: Element, start: np.ndarray, end: np.ndarray, radius: float, color: Color, end_color: Color
+) -> None:
+    """Add a capsule as cylinder and two spheres, or one sphere where start and end coincide."""
+    axis = end - start
+    length = float(np.linalg.norm(axis))
+    rotation = (0.0, float(np.arctan2(np.hypot(axis[0], axis[1]), axis[2])), float(np.arctan2(axis[1], axis[0])))
+    for role in ("visual", "collision"):
+        _add_shape(link, role, _sphere(radius), start, rotation, end_color)
+        if length > 0.0:
+            _add_shape(link, role, _cylinder(radius, length), (start + end) / 2, rotation, color)
+            _add_shape(link, role, _sphere(radius), end, rotation, end_color)
+
+
+def _add_shape(
+    link: Element, role: str, shape: Element, center: np.ndarray, rotation: tuple[float, float, float], color: Color
+) -> None:
+    """Add one primitive; `rotation` is URDF's roll, pitch, yaw in rad."""
+    element = SubElement(link, role)
+    SubElement(element, "origin", xyz=numbers(center), rpy=numbers(rotation))
+    SubElement(element, "geometry").append(shape)
+    if role == "visual":
+        name = "color_" + "_".join(f"{round(255 * part):03d}" for part in color)
+        SubElement(SubElement(element, "material", name=name), "color", rgba=numbers((*color, 1.0)))
+
+
+def _sphere(radius: float) -> Element:
+    return Element("sphere", radius=number(radius))
+
+
+def _cylinder(radius: float, length: float) -> Element:
+    return Element("cylinder", radius=number(radius), length=number(length))

@@ -1,0 +1,84 @@
+"""An exported URDF as Pinocchio reads it back: its links, their shapes, and where they are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+
+@dataclass(frozen=True)
+class Shape:
+    """One visual primitive of a link.
+
+    Attributes:
+        link: the link that carries it.
+        placement: (4, 4) pose in the link's frame.
+        radius: m.
+        length: of a cylinder, m, along its z axis; None for a sphere.
+        color: RGB in 0..1, as exported.
+    """
+
+    link: str
+    placement: np.ndarray
+    radius: float
+    length: float | None
+    color: tuple[float, float, float]
+
+    @property
+    def reach(self) -> float:
+        """Radius of the sphere about the shape's centre that holds it, m."""
+        return float(np.hypot(self.radius, (self.length or 0.0) / 2))
+
+
+class Robot:
+    """A URDF text, parsed.
+
+    Args:
+        urdf: the text as exported.
+
+    Attributes:
+        parents: each link's parent link, parents first; the root's is None.
+        shapes: the visual primitives of all links.
+    """
+
+    def __init__(self, urdf: str) -> None:
+        """Parse the text."""
+        self._model = pin.buildModelFromXML(urdf)
+        self._data = self._model.createData()
+        self._frames = [(k, frame) for k, frame in enumerate(self._model.frames) if frame.type == pin.FrameType.BODY]
+        self.parents = {frame.name: self._parent(frame) for _, frame in self._frames}
+        visuals = pin.buildGeomFromUrdfString(self._model, urdf, pin.GeometryType.VISUAL)
+        self.shapes = tuple(self._shape(item) for item in visuals.geometryObjects)
+
+    def link_poses(self, angles: Mapping[str, float]) -> dict[str, np.ndarray]:
+        """Pose (4, 4) of every link in the root link's frame.
+
+        Args:
+            angles: joint name -> rad; joints not named stay at zero.
+        """
+        configuration = pin.neutral(self._model)
+        for name, angle in angles.items():
+            configuration[self._model.joints[self._model.getJointId(name)].idx_q] = angle
+        pin.framesForwardKinematics(self._model, self._data, configuration)
+        return {frame.name: np.array(self._data.oMf[k].homogeneous) for k, frame in self._frames}
+
+    def _parent(self, frame: Any) -> str | None:
+        """The nearest body frame above a frame, by name."""
+        while frame.parentFrame != 0:
+            frame = self._model.frames[frame.parentFrame]
+            if frame.type == pin.FrameType.BODY:
+                return str(frame.name)
+        return None
+
+    def _shape(self, item: Any) -> Shape:
+        """A visual of the model, which Pinocchio places relative to the joint."""
+        frame = self._model.frames[item.parentFrame]
+        placement = np.array((frame.placement.inverse() * item.placement).homogeneous)
+        red, green, blue = (float(part) for part in item.meshColor[:3])
+        half_length = getattr(item.geometry, "halfLength", None)
+        length = None if half_length is None else 2 * float(half_length)
+        return Shape(str(frame.name), placement, float(item.geometry.radius), length, (red, green, blue))

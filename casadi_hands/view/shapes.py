@@ -1,0 +1,109 @@
+"""Spheres and cylinders as meshes in two tones, so that a body's rotation can be seen."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from meshcat.geometry import Mesh, Sphere, TriangularMeshGeometry, pack_numpy_array
+
+Color = tuple[float, float, float]
+
+_STEPS = 10  # mesh cells along each side of a patch; a patch spans a quarter turn
+
+
+class FineSphere(Sphere):  # type: ignore[misc]
+    """Meshcat's sphere with an outline that looks round."""
+
+    def lower(self, object_data: dict[str, Any]) -> dict[str, Any]:
+        """The geometry as three.js reads it."""
+        return {**super().lower(object_data), "widthSegments": 48, "heightSegments": 24}
+
+
+class LayeredMesh(Mesh):  # type: ignore[misc]
+    """A mesh with a place in the order of drawing.
+
+    Args:
+        geometry: any of meshcat's.
+        material: any of meshcat's.
+        layer: transparent meshes are drawn from the lowest layer to the highest.
+    """
+
+    def __init__(self, geometry: Any, material: Any, layer: int) -> None:
+        """Keep the layer beside what meshcat keeps."""
+        super().__init__(geometry, material)
+        self.layer = layer
+
+    def lower(self) -> dict[str, Any]:
+        """The mesh as three.js reads it."""
+        data: dict[str, Any] = super().lower()
+        data["object"]["renderOrder"] = self.layer
+        return data
+
+
+class PatchedMesh(TriangularMeshGeometry):  # type: ignore[misc]
+    """A mesh of patches of one colour each, with the normals of the smooth surface.
+
+    Args:
+        patches: for each patch the points (3, n, n) and normals (3, n, n) of a grid.
+        colors: RGB in 0..1 for each patch.
+    """
+
+    def __init__(self, patches: list[tuple[np.ndarray, np.ndarray]], colors: list[Color]) -> None:
+        """Join the patches."""
+        cells = _cells(patches[0][0].shape[1])
+        count = patches[0][0][0].size
+        super().__init__(
+            vertices=np.vstack([points.reshape(3, -1).T for points, _ in patches]),
+            faces=np.vstack([cells + k * count for k in range(len(patches))]),
+            color=np.vstack([np.tile(color, (count, 1)) for color in colors]),
+        )
+        self.normals = np.vstack([normals.reshape(3, -1).T for _, normals in patches]).astype(np.float32)
+
+    def lower(self, object_data: dict[str, Any]) -> dict[str, Any]:
+        """The geometry as three.js reads it."""
+        data: dict[str, Any] = super().lower(object_data)
+        data["data"]["attributes"]["normal"] = pack_numpy_array(self.normals.T)
+        return data
+
+
+def patched_sphere(radius: float, tones: tuple[Color, Color]) -> PatchedMesh:
+    """A sphere about the origin, its octants alternating in colour."""
+    patches, colors = [], []
+    for k, (quarter, half) in enumerate(_octants()):
+        azimuth, height = _grid(quarter, (0.0, np.pi / 2) if half == 0 else (-np.pi / 2, 0.0))
+        normals = np.array([np.cos(height) * np.cos(azimuth), np.cos(height) * np.sin(azimuth), np.sin(height)])
+        patches.append((radius * normals, normals))
+        colors.append(tones[(k + half) % 2])
+    return PatchedMesh(patches, colors)
+
+
+def patched_cylinder(radius: float, length: float, tones: tuple[Color, Color]) -> PatchedMesh:
+    """An open cylinder about the z axis, centred; its colours continue those of spheres at its ends."""
+    patches, colors = [], []
+    for k, (quarter, half) in enumerate(_octants()):
+        azimuth, height = _grid(quarter, (0.0, length / 2) if half == 0 else (-length / 2, 0.0))
+        normals = np.array([np.cos(azimuth), np.sin(azimuth), np.zeros_like(azimuth)])
+        patches.append((radius * normals + np.array([0.0, 0.0, 1.0])[:, None, None] * height, normals))
+        colors.append(tones[(k + half) % 2])
+    return PatchedMesh(patches, colors)
+
+
+def _octants() -> list[tuple[tuple[float, float], int]]:
+    """Azimuth range (rad) and half (0 upper, 1 lower) of the eight patches, the four upper first."""
+    quarters = [(k * np.pi / 2, (k + 1) * np.pi / 2) for k in range(4)]
+    return [(quarter, half) for half in (0, 1) for quarter in quarters]
+
+
+def _grid(first: tuple[float, float], second: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Two coordinates over a patch, each (n, n), n = steps + 1."""
+    one, two = np.meshgrid(np.linspace(*first, _STEPS + 1), np.linspace(*second, _STEPS + 1), indexing="ij")
+    return one, two
+
+
+def _cells(side: int) -> np.ndarray:
+    """Triangles (2(n-1)², 3) of a grid of n x n points numbered row by row, counterclockwise seen from outside."""
+    corner = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)).ravel()
+    lower = np.stack([corner, corner + side, corner + side + 1], axis=1)
+    upper = np.stack([corner, corner + side + 1, corner + 1], axis=1)
+    return np.vstack([lower, upper])
