@@ -1,0 +1,91 @@
+"""How well a finger serves its contact: what Algorithm 1 compares with its threshold.
+
+The thesis adds eeTarget and jacNull of the forces that the floating stage happened to choose. Squeezing forces
+are free, though: a hand may press along directions its joints command. So the null-space share is measured on
+the forces that serve this hand best - of all friction-feasible ones that make the needed wrench, those that
+leave the least to be held passively. A finger that can hold its share scores near zero, one that cannot scores
+its share of the weight: the margin is wide.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+from casadi_hands.kinematics import finger_kinematics
+from casadi_hands.stages.finger_symbols import tip_point
+from casadi_hands.stages.grasp import friction_edges, grasp_map
+from casadi_hands.stages.synthesis import FingerSeed, Synthesised
+from casadi_hands.stages.target import Target
+from casadi_hands.terms.finger import NULL_SPACE_DAMPING
+
+Array = NDArray[np.float64]
+THRESHOLD = 0.12  # default; see scripts/score_margin.py for how far structures lie from it
+TIP_WEIGHT = 50.0  # of Table 2.3's last step
+_BALANCE = 1e3  # weight of the wrench's balance against passive forces
+_STAY = 0.005  # weight of staying with the planned forces, which bounds the squeeze
+
+
+def finger_scores(target: Target, hand: Synthesised) -> Array:
+    """Score (F,) of each finger: 50·(tip distance in half extents)² plus passive force in m·g, keyframe means."""
+    placed = [place(target, finger, contact) for finger, contact in zip(hand.fingers, hand.contacts, strict=True)]
+    scores = np.zeros(len(placed))
+    for i, contact in enumerate(hand.contacts):
+        active = target.active[:, contact]
+        misses = ((placed[i][0] - target.points[:, contact]) ** 2).sum(axis=1)
+        scores[i] += TIP_WEIGHT * float(misses[active].mean()) if active.any() else 0.0
+    passive = np.zeros((len(target.times), len(placed)))
+    for k in range(len(target.times)):
+        passive[k] = _passive_forces(target, hand.contacts, k, [jacobians[k] for _, jacobians in placed])
+    for i, contact in enumerate(hand.contacts):
+        active = target.active[:, contact]
+        scores[i] += float(passive[active, i].mean()) if active.any() else 0.0
+    return scores
+
+
+def place(target: Target, finger: FingerSeed, contact: int) -> tuple[Array, Array]:
+    """Contact points (N, 3) and their Jacobians (N, 3, n) at the keyframes, palm frame."""
+    function = finger_kinematics(finger.joints)
+    strings = target.string_of(contact)
+    points, jacobians = [], []
+    for k, angles in enumerate(finger.angles):
+        on_link, _ = tip_point(ca.DM(finger.tips[strings[k]]), finger.lengths[-1], target.link_radius)
+        base = np.append(finger.base, 0)
+        *_, point, jacobian = function(base, finger.axis_vectors.T, finger.lengths, angles, on_link)
+        points.append(np.asarray(point).reshape(-1))
+        jacobians.append(np.asarray(jacobian))
+    return np.array(points), np.array(jacobians)
+
+
+def passive_projector(jacobian: Array) -> Array:
+    """(3, 3) onto the forces that no joint supplies, damped as eq. 2.23 is here."""
+    normal_matrix = jacobian.T @ jacobian + NULL_SPACE_DAMPING**2 * np.eye(jacobian.shape[1])
+    return np.eye(3) - jacobian @ np.linalg.solve(normal_matrix, jacobian.T)
+
+
+def _passive_forces(target: Target, contacts: Sequence[int], k: int, jacobians: Sequence[Array]) -> Array:
+    """Passive force (F,) of each finger at a keyframe, with forces shared out so that it is least."""
+    active = [i for i, contact in enumerate(contacts) if target.active[k, contact]]
+    passive = np.zeros(len(contacts))
+    if not active:
+        return passive
+    chosen = [contacts[i] for i in active]
+    edges = friction_edges(target.normals[k, chosen], np.full(len(chosen), target.model.friction))
+    count = edges.shape[1] // len(chosen)
+    spread = np.zeros((3 * len(chosen), edges.shape[1]))
+    for j in range(len(chosen)):
+        spread[3 * j : 3 * j + 3, j * count : (j + 1) * count] = edges[:, j * count : (j + 1) * count]
+    projectors = np.zeros((3 * len(chosen),) * 2)
+    for j, i in enumerate(active):
+        projectors[3 * j : 3 * j + 3, 3 * j : 3 * j + 3] = passive_projector(jacobians[i])
+    grasp = grasp_map(target.points[k, chosen] - target.centers[k])
+    planned = target.forces[k, chosen].reshape(-1)
+    matrix = np.vstack([np.sqrt(_BALANCE) * grasp @ spread, projectors @ spread, np.sqrt(_STAY) * spread])
+    wanted = np.concatenate([np.sqrt(_BALANCE) * grasp @ planned, np.zeros(len(planned)), np.sqrt(_STAY) * planned])
+    forces = spread @ nnls(matrix, wanted)[0]
+    passive[active] = np.linalg.norm((projectors @ forces).reshape(-1, 3), axis=1)
+    return passive

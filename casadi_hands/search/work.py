@@ -1,0 +1,89 @@
+"""The units of work that run in processes, and the processes."""
+
+from __future__ import annotations
+
+import hashlib
+import multiprocessing
+import os
+import pickle
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from typing import Any, TypeVar
+
+import numpy as np
+
+from casadi_hands.search.seeds import random_finger
+from casadi_hands.stages.synthesis import FingerSeed, Synthesised, SynthesisStage
+from casadi_hands.stages.target import Target
+
+Result = TypeVar("Result")
+_stages: dict[tuple[bytes, tuple[int, ...], tuple[int, ...]], SynthesisStage] = {}
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def _stage(target: Target, contacts: tuple[int, ...], joints: tuple[int, ...]) -> SynthesisStage:
+    """The stage's problem, built once a process for each structure."""
+    key = (hashlib.sha256(pickle.dumps(target)).digest(), contacts, joints)
+    if key not in _stages:
+        if len(_stages) > 50:
+            _stages.clear()
+        _stages[key] = SynthesisStage(target, contacts, joints)
+    return _stages[key]
+
+
+def design_finger(target: Target, contact: int, joints: int, stream: tuple[int, ...], weights: Mapping[str, Any]) -> Synthesised:
+    """One trial of Algorithm 1: a finger alone, from the random start that ``stream`` names."""
+    seed = random_finger(target, contact, joints, np.random.default_rng(stream))
+    return _stage(target, (contact,), (joints,)).solve((seed,), weights)
+
+
+def combine_fingers(
+    target: Target, contacts: tuple[int, ...], fingers: tuple[FingerSeed, ...], weights: Mapping[str, Any]
+) -> Synthesised:
+    """One recombination of Algorithm 1: fingers designed alone, annealed again together."""
+    return _stage(target, contacts, tuple(f.joints for f in fingers)).solve(fingers, weights)
+
+
+@contextmanager
+def processes(jobs: int | None) -> Iterator[Executor | None]:
+    """An executor of ``jobs`` processes (all cores by default), one thread of linear algebra each; None for one."""
+    count = jobs or os.cpu_count() or 1
+    if count == 1:
+        yield None
+        return
+    saved = {name: os.environ.get(name) for name in _THREADS}
+    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    try:
+        with ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn")) as executor:
+            yield executor
+    finally:
+        for name, value in saved.items():
+            os.environ.pop(name, None) if value is None else os.environ.update({name: value})
+
+
+def run_all(
+    executor: Executor | None,
+    function: Callable[..., Result],
+    arguments: Sequence[tuple[Any, ...]],
+    done: Callable[[int, Result], None],
+) -> list[Result]:
+    """Call a function on every tuple of arguments; results in that order, ``done(index, result)`` as they come."""
+    if executor is None:
+        results = []
+        for index, args in enumerate(arguments):
+            results.append(function(*args))
+            done(index, results[-1])
+        return results
+    futures = {executor.submit(function, *args): index for index, args in enumerate(arguments)}
+    collected: dict[int, Result] = {}
+    try:
+        for future in as_completed(futures):
+            index = futures[future]
+            collected[index] = future.result()
+            done(index, collected[index])
+    except BaseException:
+        for future in futures:
+            future.cancel()
+        raise
+    return [collected[index] for index in range(len(arguments))]
