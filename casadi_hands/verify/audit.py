@@ -66,7 +66,9 @@ def residual_figures(folder: Folder, shots: Shots) -> list[Figure]:
     at = Figure("residual", float(values[k]), limits.residual, "weight", words)
     between = between_residual(folder)
     k = int(np.argmax(between))
-    words = f"between {time[k]:.3g} s and {time[k + 1]:.3g} s the contacts' surfaces turn the object by {{value}} unstated"
+    words = (
+        f"between {time[k]:.3g} s and {time[k + 1]:.3g} s the contacts' surfaces turn the object by {{value}} unstated"
+    )
     inside = float(between[k])
     if at.value > inside:
         inside, words = at.value, at.finding

@@ -69,14 +69,20 @@ def gap_at_samples(folder: Folder, placed: Placements) -> Figure:
     motion = folder.motion
     worst = (0.0, "no contact is active")
     for k, c in active_contacts(folder):
-        link, on_object, on_link = motion.contact_link[c], motion.contact_point_object[k, c], motion.contact_point_link[k, c]
+        link, on_object, on_link = (
+            motion.contact_link[c],
+            motion.contact_point_object[k, c],
+            motion.contact_point_link[k, c],
+        )
         rotation, position = placed["object"][0][k], placed["object"][1][k]
         link_placed = placed[link][0][k], placed[link][1][k]
         apart = float(np.linalg.norm(rotation @ on_object + position - link_placed[0] @ on_link - link_placed[1]))
         ground = folder.ground if link == "ground" else None
         other = ground or folder.links[link]
-        off_link = on_link[2] - float(folder.task.ground.height) if folder.task.ground and ground else (
-            other.surface_distance(on_link)
+        off_link = (
+            on_link[2] - float(folder.task.ground.height)
+            if folder.task.ground and ground
+            else (other.surface_distance(on_link))
         )
         cases = (
             (abs(folder.object.surface_distance(on_object)), "is {value} off the object's surface"),
@@ -96,7 +102,7 @@ def gap_between_samples(folder: Folder, path: Trajectory) -> Figure:
     for c, name in enumerate(motion.contact_names):
         link = motion.contact_link[c]
         other = folder.ground if link == "ground" else folder.links[link]
-        for i in np.flatnonzero(motion.contact_active[path.interval, c]):
+        for i in map(int, np.flatnonzero(motion.contact_active[path.interval, c])):
             if other is None or i % DENSITY == 0:
                 continue
             distance = body_distance(folder.object, path.at("object", i), other, path.at(link, i))
@@ -155,7 +161,7 @@ def _slip_steps(folder: Folder, path: Trajectory, contact: int) -> np.ndarray:
     """Return the slip of one contact from each sample to the next, (S - 1,) m, whether active or not."""
     link = folder.motion.contact_link[contact]
     slip = np.zeros(len(folder.motion.time) - 1)
-    # Every other dense time is the middle of a step: the contact point is taken there, so errors of second order cancel.
+    # Every other dense time is the middle of a step; taking the contact point there cancels second-order errors.
     for middle in range(1, len(path.time) - 1, 2):
         point, k = _contact_point(folder, path, contact, middle)
         rotation, position = path.at("object", middle)
@@ -171,4 +177,5 @@ def _carried(path: Trajectory, body: str, world: np.ndarray, middle: int) -> np.
     rotation, position = path.at(body, middle)
     local = rotation.T @ (world - position)
     before, after = path.at(body, middle - 1), path.at(body, middle + 1)
-    return (after[0] - before[0]) @ local + after[1] - before[1]
+    moved: np.ndarray = (after[0] - before[0]) @ local + after[1] - before[1]
+    return moved

@@ -112,7 +112,8 @@ def _miss(
     """Return by how much (K, 3) the shots miss the next orientation, and its Jacobian (K, 3, 3) in the launch rate."""
 
     def miss(at: np.ndarray) -> np.ndarray:
-        return (end.inv() * _integrate(folder, loads, start, at)[3]).as_rotvec()
+        turn: np.ndarray = (end.inv() * _integrate(folder, loads, start, at)[3]).as_rotvec()
+        return turn
 
     value, step = miss(rate), 1e-4
     columns = [(miss(rate + step * unit) - miss(rate - step * unit)) / (2 * step) for unit in np.eye(3)]

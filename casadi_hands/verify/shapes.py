@@ -33,16 +33,19 @@ class Capsule:
         if square == 0.0:
             return np.broadcast_to(self.start, np.shape(point))
         along = np.clip((point - self.start) @ direction / square, 0.0, 1.0)
-        return self.start + np.asarray(along)[..., None] * direction
+        nearest: np.ndarray = self.start + np.asarray(along)[..., None] * direction
+        return nearest
 
     def distance(self, point: np.ndarray) -> np.ndarray:
         """Return the (...,) signed distances of (..., 3) points to the surface, m; negative inside."""
-        return np.linalg.norm(point - self.axis_point(point), axis=-1) - self.radius
+        distance: np.ndarray = np.linalg.norm(point - self.axis_point(point), axis=-1) - self.radius
+        return distance
 
     def normal(self, point: np.ndarray) -> np.ndarray:
         """Return the (..., 3) unit outward normals at the surface points nearest to (..., 3) points."""
         outward = point - self.axis_point(point)
-        return outward / np.maximum(np.linalg.norm(outward, axis=-1, keepdims=True), 1e-300)
+        unit: np.ndarray = outward / np.maximum(np.linalg.norm(outward, axis=-1, keepdims=True), 1e-300)
+        return unit
 
 
 @dataclass(frozen=True)
@@ -152,9 +155,11 @@ def _inertial(link: ElementTree.Element) -> tuple[float, np.ndarray, np.ndarray]
         return 0.0, np.zeros(3), np.zeros((3, 3))
     placement = _placement(inertial)
     mass, tensor = inertial.find("mass"), inertial.find("inertia")
-    entries = {key: float(tensor.get(key, "0")) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")} if (
-        tensor is not None
-    ) else dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), 0.0)
+    entries = (
+        {key: float(tensor.get(key, "0")) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")}
+        if (tensor is not None)
+        else dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), 0.0)
+    )
     local = np.array(
         [
             [entries["ixx"], entries["ixy"], entries["ixz"]],
@@ -227,8 +232,10 @@ def body_distance(
     """Return the signed distance of two placed bodies by coal, m; negative is the depth of their overlap.
 
     Args:
-        first, second: the bodies.
-        first_placed, second_placed: rotation (3, 3) and position (3,) of each body's frame in the world.
+        first: one body.
+        first_placed: rotation (3, 3) and position (3,) of its frame in the world.
+        second: the other.
+        second_placed: likewise.
     """
     nearest = np.inf
     for one, one_rotation, one_position in first.solids:
@@ -240,7 +247,5 @@ def body_distance(
     return nearest
 
 
-def _transform(
-    placed: tuple[np.ndarray, np.ndarray], rotation: np.ndarray, position: np.ndarray
-) -> coal.Transform3s:
+def _transform(placed: tuple[np.ndarray, np.ndarray], rotation: np.ndarray, position: np.ndarray) -> coal.Transform3s:
     return coal.Transform3s(placed[0] @ rotation, placed[0] @ position + placed[1])

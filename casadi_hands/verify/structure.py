@@ -69,7 +69,7 @@ def _contact_problems(folder: Folder) -> list[str]:
     if idle.max(initial=0.0) > 1e-9 * folder.weight:
         k, c = np.unravel_index(np.argmax(idle), idle.shape)
         problems.append(
-            f"contact '{motion.contact_names[c]}' bears {idle[k, c]:.3g} N at {motion.time[k]:.3g} s, where it is not active"
+            f"contact '{motion.contact_names[c]}' bears {idle[k, c]:.3g} N at {motion.time[k]:.3g} s, though not active"
         )
     return problems
 
@@ -116,12 +116,17 @@ def _object_problems(folder: Folder) -> list[str]:
 
 
 def _is_capsule(
-    start: np.ndarray, end: np.ndarray, radius: float, other_start: np.ndarray, other_end: np.ndarray, other_radius: float
+    start: np.ndarray,
+    end: np.ndarray,
+    radius: float,
+    other_start: np.ndarray,
+    other_end: np.ndarray,
+    other_radius: float,
 ) -> bool:
     near = 1e-6 * max(other_radius, float(np.linalg.norm(other_end - other_start)))
     straight = np.linalg.norm(start - other_start) + np.linalg.norm(end - other_end)
     turned = np.linalg.norm(start - other_end) + np.linalg.norm(end - other_start)
-    return min(straight, turned) < near and abs(radius - other_radius) < near
+    return bool(min(straight, turned) < near and abs(radius - other_radius) < near)
 
 
 def _hand_problems(folder: Folder) -> list[str]:
@@ -149,7 +154,9 @@ def _link_problems(folder: Folder, name: str, stated: dict[str, Any], after: str
         joint = folder.model.getJointId(after.replace("_link", "_joint"))
         offset = folder.model.jointPlacements[joint].translation
         if not np.allclose(offset, [0, 0, length], atol=1e-6 * length):
-            problems.append(f"{who}: the next joint in hand.urdf is not at its end, {1e3 * length:.4g} mm from its start")
+            problems.append(
+                f"{who}: the next joint in hand.urdf is not at its end, {1e3 * length:.4g} mm from its start"
+            )
     volume = np.pi * radius**2 * (length + 4 / 3 * radius)
     if not _same(body.mass, folder.task.hand.density * volume, 1e-4):
         problems.append(f"{who}: {body.mass:.4g} kg is not its volume times the task's density")
@@ -163,7 +170,7 @@ def _palm_problems(folder: Folder) -> list[str]:
         return []
     where = np.asarray(palm.position, dtype=float)
     problems = []
-    turned = (Rotation.from_matrix(palm.rotation).inv() * Rotation.from_quat(motion.base_orientation, scalar_first=True))
+    turned = Rotation.from_matrix(palm.rotation).inv() * Rotation.from_quat(motion.base_orientation, scalar_first=True)
     moved = np.linalg.norm(motion.base_position - where, axis=1) + folder.length * turned.magnitude()
     checked = moved if palm.motion is None else moved[:1]
     if checked.max() > 1e-6:

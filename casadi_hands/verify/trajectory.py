@@ -8,8 +8,8 @@ stretch in which the finger's contacts neither begin nor end, because there its 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -81,7 +81,8 @@ def place_links(
     Args:
         folder: the design.
         joints: (T, J) rad, in the order of the motion's joint names.
-        base_rotation, base_position: (T, 3, 3) and (T, 3), the palm's frame in the world.
+        base_rotation: (T, 3, 3), world <- palm.
+        base_position: (T, 3) m, the palm's origin in the world.
     """
     model, data, columns = folder.model, folder.model.createData(), folder.joint_columns()
     frames = {name: model.getFrameId(name) for name in folder.links}
@@ -105,17 +106,13 @@ def _joints(folder: Folder, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         mine = [c for c, link in enumerate(motion.contact_link) if link.startswith(f"{finger}_link")]
         switches = np.any(motion.contact_active[1:, mine] != motion.contact_active[:-1, mine], axis=1)
         breaks = [0, *[int(k) + 1 for k in np.flatnonzero(switches)], len(motion.time) - 1]
-        for first, last in zip(breaks[:-1], breaks[1:], strict=True):
+        for first, last in pairwise(breaks):
             if first == last:
                 continue
-            spline = _spline(motion.time[first : last + 1], motion.joint_angles[first : last + 1, column])
+            spline = CubicSpline(motion.time[first : last + 1], motion.joint_angles[first : last + 1, column])
             inside = (time >= motion.time[first]) & (time <= motion.time[last])
             angles[inside, column], speeds[inside, column] = spline(time[inside]), spline(time[inside], 1)
     return angles, speeds
-
-
-def _spline(time: np.ndarray, values: np.ndarray) -> Callable[..., np.ndarray]:
-    return CubicSpline(time, values, bc_type="not-a-knot")
 
 
 def _base(folder: Folder, interval: np.ndarray, fraction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -132,9 +129,7 @@ def _base(folder: Folder, interval: np.ndarray, fraction: np.ndarray) -> tuple[n
     return _cubic(motion.time, motion.base_position, orientation, velocity, rate, interval, fraction)
 
 
-def _object(
-    folder: Folder, shots: Shots, interval: np.ndarray, fraction: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _object(folder: Folder, shots: Shots, interval: np.ndarray, fraction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the object's rotations (T, 3, 3) and positions (T, 3): cubic, with the shots' velocities."""
     velocity = _at_samples(shots.launch_velocity, shots.arrival_velocity)
     rate = _at_samples(shots.launch_rate, shots.arrival_rate)
@@ -155,9 +150,12 @@ def _cubic(
 
     Args:
         time: (S,) s.
-        position, orientation: at the samples, (S, 3) m and S rotations, world.
-        velocity, rate: (S, 3) m/s in the world and rad/s in the body's frame.
-        interval, fraction: (T,) which interval, and how far through it.
+        position: (S, 3) m, world.
+        orientation: S rotations, world <- body.
+        velocity: (S, 3) m/s, world.
+        rate: (S, 3) rad/s, body's frame.
+        interval: (T,) which interval each dense time lies in.
+        fraction: (T,) how far through it.
 
     Returns:
         rotations (T, 3, 3) and positions (T, 3).
@@ -173,8 +171,12 @@ def _cubic(
 
 
 def _at_samples(launch: np.ndarray, arrival: np.ndarray) -> np.ndarray:
-    """Return (S, 3): where a sample is both arrived at and launched from, the mean."""
-    return np.concatenate([launch[:1], 0.5 * (launch[1:] + arrival[:-1]), arrival[-1:]])
+    """Return (S, 3) velocities: where a sample is both arrived at and launched from, the mean.
+
+    Taking half the jump off at either end as well keeps a motion that breaks physics from bulging there.
+    """
+    jump = launch[1:] - arrival[:-1]
+    return np.concatenate([launch[:1] - 0.5 * jump[:1], launch[1:] - 0.5 * jump, arrival[-1:] + 0.5 * jump[-1:]])
 
 
 def _inverse_right_jacobian(turn: np.ndarray) -> np.ndarray:

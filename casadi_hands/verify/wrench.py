@@ -31,7 +31,8 @@ def contact_jacobian(folder: Folder, data: pin.Data, k: int, c: int) -> np.ndarr
     pin.updateFramePlacements(model, data)
     twist = pin.getFrameJacobian(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)[:, columns]
     arm = data.oMf[frame].rotation @ folder.motion.contact_point_link[k, c]
-    return twist[:3] - pin.skew(arm) @ twist[3:]
+    jacobian: np.ndarray = twist[:3] - pin.skew(arm) @ twist[3:]
+    return jacobian
 
 
 def planned_torques(folder: Folder) -> np.ndarray:
@@ -47,7 +48,8 @@ def planned_torques(folder: Folder) -> np.ndarray:
 def force_in_palm(folder: Folder, k: int, c: int) -> np.ndarray:
     """Return the force (3,) on the object at a contact, palm frame, N."""
     base = Rotation.from_quat(folder.motion.base_orientation[k], scalar_first=True)
-    return base.apply(folder.motion.contact_force[k, c], inverse=True)
+    force: np.ndarray = base.apply(folder.motion.contact_force[k, c], inverse=True)
+    return force
 
 
 def torque_figure(folder: Folder) -> Figure:

@@ -121,7 +121,11 @@ def object_urdf(task: Task) -> str:
 def result(task: Task, hand: Hand) -> dict[str, Any]:
     """Return the part of result.json that the audit reads."""
     fingers = [
-        {"name": f.name, "base": f.base, "links": [{"length": s.length, "radius": s.radius, "axis": s.axis} for s in f.links]}
+        {
+            "name": f.name,
+            "base": f.base,
+            "links": [{"length": s.length, "radius": s.radius, "axis": s.axis} for s in f.links],
+        }
         for f in hand.fingers
     ]
     goals = [
@@ -204,8 +208,8 @@ def carried(directory: Path) -> Scene:
 
 def _goals(times: Any, positions: Any, quaternions: Any) -> str:
     lines = [
-        f"  - {{at: {float(t)}, position: {np.asarray(p).tolist()}, rotation: {{quaternion: {np.asarray(q).tolist()}}}}}"
-        for t, p, q in zip(times, positions, quaternions, strict=True)
+        f"  - {{at: {float(t)}, position: {list(p)}, rotation: {{quaternion: {list(q)}}}}}"
+        for t, p, q in zip(times, np.asarray(positions).tolist(), np.asarray(quaternions).tolist(), strict=True)
     ]
     return "\n".join(lines)
 
@@ -221,7 +225,7 @@ def _carrying_forces(time: np.ndarray, mass: float, inertia: np.ndarray) -> np.n
         angle, spin_up = 0.25 * (1 - np.cos(np.pi * t)), 0.25 * np.pi**2 * np.cos(np.pi * t)
         acceleration = 0.02 * np.pi**2 * np.cos(np.pi * t) * np.array([1.0, 0.5, 0.3])
         turn = Rotation.from_rotvec(angle * axis)
-        force = turn.apply(mass * (acceleration + [0, 0, 9.81]), inverse=True)
+        force = turn.apply(mass * (acceleration + np.array([0, 0, 9.81])), inverse=True)
         wrench = np.concatenate([force, inertia @ axis * spin_up])
         forces.append(np.linalg.lstsq(grasp, wrench, rcond=None)[0] + squeeze)
     return np.array(forces).reshape(-1, 3, 3)
@@ -244,7 +248,7 @@ def integrate(
     """Integrate a body with SciPy under forces (S, C, 3) at fixed points (C, 3), both in its own frame.
 
     Returns:
-        positions (S, 3) and orientations (S, 4) [w, x, y, z] at the times; it starts upright and at rest but for ``rate``.
+        positions (S, 3) and orientations (S, 4) [w, x, y, z] ; it starts upright, at rest but for ``rate``.
     """
     state = np.concatenate([start, np.zeros(3), np.eye(3).ravel(), rate])
     positions, turns = [state[:3]], [np.eye(3)]
@@ -286,7 +290,7 @@ def _grasp(task: Task) -> tuple[Hand, np.ndarray, np.ndarray]:
         fingers.append(Finger(name, tuple(base.tolist()), links))
         angles += [out_angle, in_angle - out_angle]
         turn = Rotation.from_rotvec(in_angle * np.array(axis))
-        points.append(turn.apply(-TIP * radial, inverse=True) + [0, 0, lengths[1]])
+        points.append(turn.apply(-TIP * radial, inverse=True) + np.array([0, 0, lengths[1]]))
     limits = np.deg2rad(150.0)
     hand = Hand(0.05, float(task.palm.thickness), tuple(fingers), -limits, limits, 0.5, 5.0, float(task.hand.density))
     return hand, np.array(angles), np.array(points)
@@ -294,3 +298,49 @@ def _grasp(task: Task) -> tuple[Hand, np.ndarray, np.ndarray]:
 
 def _lean(radial: np.ndarray, angle: float) -> np.ndarray:
     return np.cos(angle) * np.array([0.0, 0.0, 1.0]) + np.sin(angle) * radial
+
+
+def plain(task: Task, time: np.ndarray, links: int = 1, **arrays: Any) -> Scene:
+    """A hand of straight fingers on the palm's rim, touching nothing, and an object that stands at its first goal.
+
+    Arrays given by name replace those of the motion; every finger has a contact, none of them active.
+    """
+    fingers = []
+    for i, name in enumerate(task.fingers):
+        turn = 2 * np.pi * i / len(task.fingers)
+        base = (0.8 * task.palm.radius * np.cos(turn), 0.8 * task.palm.radius * np.sin(turn), 0.0)
+        fingers.append(Finger(name, base, (Link(0.04, TIP, (0.0, 1.0, 0.0)),) * links))
+    limit, samples, contacts = float(np.deg2rad(150.0)), len(time), len(fingers)
+    hand = Hand(task.palm.radius, task.palm.thickness, tuple(fingers), -limit, limit, 1.0, 5.0, task.hand.density)
+    start = np.asarray(task.motion[0].position or (0.0, 0.0, 0.0))
+    base_turn = Rotation.from_matrix(task.palm.rotation).as_quat(scalar_first=True)
+    rows: dict[str, Any] = {
+        "time": time,
+        "object_position": np.tile(start, (samples, 1)),
+        "object_orientation": np.tile([1.0, 0.0, 0.0, 0.0], (samples, 1)),
+        "base_position": np.tile(np.asarray(task.palm.position), (samples, 1)),
+        "base_orientation": np.tile(base_turn, (samples, 1)),
+        "joint_angles": np.zeros((samples, hand.degrees_of_freedom)),
+        "joint_names": hand.joint_names,
+        "contact_names": tuple(task.fingers),
+        "contact_link": tuple(f"finger{i}_link{links - 1}" for i in range(contacts)),
+        "contact_active": np.zeros((samples, contacts), dtype=bool),
+        "contact_force": np.zeros((samples, contacts, 3)),
+        "contact_point_object": np.zeros((samples, contacts, 3)),
+        "contact_point_link": np.zeros((samples, contacts, 3)),
+        "external_force": np.zeros((samples, 3)),
+        "external_torque": np.zeros((samples, 3)),
+    }
+    return Scene(task, hand, Motion(**{**rows, **arrays}))
+
+
+SPHERE = """
+name: ball
+object: {mass: 0.2, shapes: [{sphere: {center: [0, 0, 0], radius: 0.03}}]}
+palm: {radius: 0.05, position: [0, 0, -0.5], facing: [0, 0, 1]}
+motion: [{at: 0, position: [0, 0, 0]}, {at: 1, position: [0, 0, 0]}]
+fingers: {left: {touches: [-0.03, 0, 0]}, right: {touches: [0.03, 0, 0]}}
+friction: 0.5
+hand: {joint_limits: [-150, 150], link_radius: 0.006}
+"""
+"""A ball of 3 cm that stands half a metre over an upright palm, for scenes where the hand matters little."""

@@ -1,0 +1,201 @@
+"""The audit passes a result that is right and names what is wrong with one that is not."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fixture import Scene, carried, object_urdf, read_task
+from rich.console import Console
+
+from casadi_hands.errors import DesignError
+from casadi_hands.task import task_to_yaml
+from casadi_hands.verify import audit
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    return carried(tmp_path_factory.mktemp("task"))
+
+
+def test_a_good_result_is_certified(good: Scene, tmp_path: Path) -> None:
+    found = audit(good.write(tmp_path / "good"))
+    assert found.certified, found.reasons
+    assert found.reasons == []
+    assert found.figures["residual"].value < 1e-7
+    assert found.figures["gap"].value < 1e-12
+    assert found.figures["slip"].value < 5e-5
+    assert found.figures["friction_excess"].value < -0.5
+
+
+def test_certificate_is_json_and_table_prints(good: Scene, tmp_path: Path) -> None:
+    found = audit(good.write(tmp_path / "good"))
+    certificate = json.loads(json.dumps(found.as_certificate(), allow_nan=False))
+    limits = good.task.limits.model_dump()
+    assert limits.keys() <= certificate.keys()
+    assert all(entry["holds"] for entry in certificate.values())
+    console = Console(width=240, record=True, file=io.StringIO())
+    console.print(found.table())
+    assert "disturbance radius" in console.export_text()
+
+
+def _force_scaled(scene: Scene) -> Scene:
+    return scene.moved(contact_force=1.02 * scene.motion.contact_force)
+
+
+def _contact_moved(scene: Scene) -> Scene:
+    points = scene.motion.contact_point_object.copy()
+    points[:, 1, 2] += 1e-3
+    return scene.moved(contact_point_object=points)
+
+
+def _joint_shifted(scene: Scene) -> Scene:
+    angles = scene.motion.joint_angles.copy()
+    angles[7, 3] += np.deg2rad(1.0)
+    return scene.moved(joint_angles=angles)
+
+
+def _normal_flipped(scene: Scene) -> Scene:
+    points = scene.motion.contact_point_link.copy()
+    length = scene.hand.fingers[2].links[1].length
+    points[:, 2] = np.array([0, 0, 2 * length]) - points[:, 2]
+    return scene.moved(contact_point_link=points)
+
+
+def _force_flipped(scene: Scene) -> Scene:
+    force = scene.motion.contact_force.copy()
+    force[4, 0] *= -1.0
+    return scene.moved(contact_force=force)
+
+
+def _contacts_swapped(scene: Scene) -> Scene:
+    one, two, three = scene.motion.contact_link
+    return scene.moved(contact_link=(two, one, three))
+
+
+def _forces_swapped(scene: Scene) -> Scene:
+    return scene.moved(contact_force=scene.motion.contact_force[:, [1, 0, 2]])
+
+
+def _time_stretched(scene: Scene) -> Scene:
+    return scene.moved(time=1.05 * scene.motion.time)
+
+
+def _link_shortened(scene: Scene) -> Scene:
+    first = scene.hand.fingers[0]
+    links = (replace(first.links[0], length=first.links[0].length - 1e-3), first.links[1])
+    return replace(scene, hand=replace(scene.hand, fingers=(replace(first, links=links), *scene.hand.fingers[1:])))
+
+
+def _quaternion_not_unit(scene: Scene) -> Scene:
+    return scene.moved(object_orientation=1.001 * scene.motion.object_orientation)
+
+
+def _goal_text(scene: Scene, directory: Path) -> Scene:
+    moved = scene.task.motion[1].model_copy(
+        update={"position": tuple((np.array(scene.task.motion[1].position) + np.array([0, 0, 1e-3])).tolist())}
+    )
+    task = scene.task.model_copy(update={"motion": (scene.task.motion[0], moved, scene.task.motion[2])})
+    return replace(scene, task=read_task(directory, task_to_yaml(task)))
+
+
+@pytest.mark.parametrize(
+    ("tamper", "figures", "words"),
+    [
+        (_force_scaled, {"residual", "residual_between"}, "nothing exerts"),
+        (_contact_moved, {"gap", "residual"}, "contact 'two' is at two places"),
+        (_joint_shifted, {"gap"}, "finger 'two' (link 1)"),
+        (_normal_flipped, {"gap"}, "contact 'three' is at two places 12 mm apart"),
+        (_force_flipped, {"pull"}, "contact 'one' at 0.4 s"),
+        (_contacts_swapped, {"structure", "gap"}, "contact 'one' is on finger 'two' (link 1), not on its own finger"),
+        (_forces_swapped, {"residual", "pull"}, "nothing exerts"),
+        (_time_stretched, {"structure", "residual"}, "time: samples are up to 0.105 s apart"),
+        (_link_shortened, {"gap"}, "finger 'one' (link 1)"),
+        (_quaternion_not_unit, {"structure"}, "object_orientation: the quaternion at"),
+    ],
+)
+def test_tampering_is_named(
+    good: Scene, tmp_path: Path, tamper: Callable[[Scene], Scene], figures: set[str], words: str
+) -> None:
+    found = audit(tamper(good).write(tmp_path / "bad"))
+    assert not found.certified
+    assert figures <= {name for name, figure in found.figures.items() if not figure.holds}
+    assert any(words in reason for reason in found.reasons), found.reasons
+
+
+def test_goals_moved_in_the_task_are_missed(good: Scene, tmp_path: Path) -> None:
+    found = audit(_goal_text(good, tmp_path).write(tmp_path / "bad"))
+    assert found.figures["goal_position"].value == pytest.approx(1e-3, rel=1e-6)
+    assert found.reasons == ["the object is 1 mm from goal 2 at 1 s; limit 0.5 mm"]
+
+
+def test_goals_moved_in_the_result_are_named(good: Scene, tmp_path: Path) -> None:
+    folder = good.write(tmp_path / "bad")
+    record = json.loads((folder / "result.json").read_text())
+    record["goals"][1]["position"][0] += 0.01
+    (folder / "result.json").write_text(json.dumps(record))
+    assert audit(folder).reasons == ["goals: goal 2 of result.json is not that of task.yaml"]
+
+
+def test_mass_changed_in_one_file_is_named(good: Scene, tmp_path: Path) -> None:
+    folder = good.write(tmp_path / "bad")
+    heavier = good.task.model_copy(update={"object": good.task.object.model_copy(update={"mass": 0.11})})
+    (folder / "object.urdf").write_text(object_urdf(heavier))
+    found = audit(folder)
+    assert "mass: object.urdf says 0.11 kg, task.yaml says 0.1 kg" in found.reasons
+    assert not found.figures["residual"].holds
+
+
+def test_mass_changed_everywhere_leaves_a_residual(good: Scene, tmp_path: Path) -> None:
+    heavier = good.task.model_copy(update={"object": good.task.object.model_copy(update={"mass": 0.11})})
+    found = audit(replace(good, task=heavier).write(tmp_path / "bad"))
+    assert found.figures["structure"].holds
+    # The forces of 0.1 kg carry 10/11 of 0.11 kg: one eleventh of the weight is missing, and more where it accelerates.
+    assert 0.09 < found.figures["residual"].value < 0.12
+
+
+def test_link_shortened_in_the_urdf_alone_is_named(good: Scene, tmp_path: Path) -> None:
+    folder = _link_shortened(good).write(tmp_path / "bad")
+    whole = json.loads((good.write(tmp_path / "good") / "result.json").read_text())
+    (folder / "result.json").write_text(json.dumps(whole))
+    assert any("finger 'one' (link 0): hand.urdf has a capsule of" in reason for reason in audit(folder).reasons)
+
+
+def test_help_from_nowhere_is_named(good: Scene, tmp_path: Path) -> None:
+    helped = good.moved(external_force=np.full((21, 3), 0.01))
+    assert any(
+        "the object is helped by what the task does not state" in r for r in audit(helped.write(tmp_path)).reasons
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "message"),
+    [
+        ("contact_force", lambda a: a[:, :2], r"contact_force has shape \(21, 2, 3\), not \(21, 3, 3\)"),
+        ("time", lambda a: a[::-1], "three increasing samples"),
+        ("joint_angles", lambda a: a * np.nan, "joint_angles holds a number that is not finite"),
+        ("joint_names", lambda a: a[::-1] + "x", "are not the joints of hand.urdf"),
+        ("contact_link", lambda a: a + "x", "no link of hand.urdf"),
+        ("base_orientation", lambda a: 0 * a, "zero quaternion"),
+    ],
+)
+def test_unreadable_motion_is_refused(
+    good: Scene, tmp_path: Path, name: str, change: Callable[[np.ndarray], np.ndarray], message: str
+) -> None:
+    array = np.asarray(getattr(good.motion, name))
+    changed = np.char.add(array, "x") if array.dtype.kind == "U" else change(array)
+    with pytest.raises(DesignError, match=message):
+        audit(good.moved(**{name: changed}).write(tmp_path))
+
+
+@pytest.mark.parametrize("name", ["task.yaml", "hand.urdf", "object.urdf", "motion.npz", "result.json"])
+def test_missing_file_is_named(good: Scene, tmp_path: Path, name: str) -> None:
+    folder = good.write(tmp_path / "bad")
+    (folder / name).unlink()
+    with pytest.raises(DesignError, match=name):
+        audit(folder)
