@@ -12,7 +12,7 @@ Color = tuple[float, float, float]
 
 PALM_COLOR = (0.62, 0.65, 0.70)
 OBJECT_COLOR = (0.95, 0.75, 0.30)
-GROUND_COLOR = (0.90, 0.91, 0.92)
+GROUND_COLOR = (0.78, 0.80, 0.82)
 _FINGER_COLORS = (
     (0.20, 0.47, 0.75),
     (0.20, 0.63, 0.45),

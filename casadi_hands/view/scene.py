@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -135,6 +135,8 @@ def _draw_goals(node: Any, design: Design, item: Robot, radius: float) -> None:
             goal = node[f"goal{len(drawn)}"]
             goal.set_transform(pose)
             for k, shape in enumerate(item.shapes):
+                # A little thinner, so that an object at its goal hides the ghost instead of mixing with it.
+                shape = replace(shape, radius=0.985 * shape.radius)
                 _draw_shape(goal[f"shape{k}"]["depth"], shape, depth, layer=1)
                 _draw_shape(goal[f"shape{k}"]["color"], shape, ghost, layer=2)
             drawn.append(pose)

@@ -1,0 +1,163 @@
+"""A design on disk and back."""
+
+import json
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from casadi_hands.design import Design
+from casadi_hands.errors import DesignError
+from casadi_hands.task import parse_task
+from tests.export.example import TASK, example_design
+
+FILES = {"task.yaml", "hand.urdf", "object.urdf", "scene.xml", "motion.npz", "result.json", "viewer.html"}
+
+DRAWING = """
+name: draw
+object:
+  mass: 0.05
+  shapes: [{capsule: {start: [0, 0, -0.06], end: [0, 0, 0.06], radius: 0.01}}]
+tool: [0, 0, -0.07]
+palm: {radius: 0.06, position: [0, 0, 0.3], facing: [0, 0, -1]}
+motion: [{at: 0, tool_at: [0, 0, 0]}, {at: 1, tool_at: [0.02, 0, 0]}]
+fingers:
+  thumb: {touches: [0.01, 0, 0.03]}
+  index: {touches: [-0.01, 0, 0.04]}
+  middle: {touches: [0, 0.01, 0.02]}
+"""
+
+
+@pytest.fixture
+def saved(tmp_path):
+    example_design().save(tmp_path / "out")
+    return tmp_path / "out"
+
+
+def record(folder):
+    def refuse(constant):
+        raise AssertionError(f"{constant} is not JSON")
+
+    return json.loads((folder / "result.json").read_text(), parse_constant=refuse)
+
+
+def test_a_folder_holds_every_file(saved):
+    assert {path.name for path in saved.iterdir()} == FILES
+
+
+def test_a_design_comes_back_as_it_was(saved):
+    design, loaded = example_design(), Design.load(saved)
+    for item in fields(Design):
+        if item.name != "motion":
+            assert getattr(loaded, item.name) == getattr(design, item.name), item.name
+    for item in fields(design.motion):
+        assert np.array_equal(getattr(loaded.motion, item.name), getattr(design.motion, item.name))
+
+
+def test_saving_again_gives_the_same_bytes(saved, tmp_path):
+    Design.load(saved).save(tmp_path / "again")
+    for name in FILES:
+        assert (saved / name).read_bytes() == (tmp_path / "again" / name).read_bytes(), name
+
+
+def test_the_record_says_what_the_format_says(saved):
+    result = record(saved)
+    assert result["format"] == 1
+    assert (result["status"], result["task"], result["degrees_of_freedom"]) == ("feasible", "move a capsule & back", 6)
+    assert result["object"]["shapes"] == [
+        {"type": "capsule", "start": [0, 0, -0.04], "end": [0, 0, 0.04], "radius": 0.02}
+    ]
+    assert (result["friction"], result["gravity"]) == (0.5, [0, 0, -9.81])
+    assert (result["ground_height"], result["ground_friction"]) == (0.2, 0.8)
+    assert result["hand"]["palm"] == {"radius": 0.06, "thickness": 0.012}
+    index = result["hand"]["fingers"][1]
+    assert (index["name"], index["base"]) == ("index", [0.02, 0.045, 0])
+    assert index["links"][1] == {"length": 0.08, "radius": 0.008, "axis": [1, 0, 0]}
+    assert {"casadi-hands", "casadi", "pin", "numpy"} <= set(result["versions"])
+    assert result["certificate"]["slip"]["holds"] is False
+    assert result["costs"]["whole_hand"]["torque"] == {"weight": 0.05, "value": 1.25}
+
+
+def test_goals_are_poses_of_the_centre_of_mass(saved):
+    goals = record(saved)["goals"]
+    assert [goal["time"] for goal in goals] == [0, 1, 2]
+    assert goals[1]["position"] == [0.115, 0, 0.3]
+    assert goals[1]["orientation"] == pytest.approx([np.cos(np.pi / 12), 0, 0, np.sin(np.pi / 12)])
+    assert goals[0]["orientation"] == [1, 0, 0, 0]
+
+
+def test_goals_of_a_drawing_are_points_of_its_tool(tmp_path):
+    Design(task=parse_task(DRAWING), status="failed", reason="nothing tried").save(tmp_path)
+    assert record(tmp_path)["goals"] == [
+        {"time": 0, "point": [0, 0, 0], "tool_point": [0, 0, -0.07]},
+        {"time": 1, "point": [0.02, 0, 0], "tool_point": [0, 0, -0.07]},
+    ]
+    assert record(tmp_path)["ground_height"] is None
+
+
+def test_a_failed_design_keeps_what_exists(tmp_path):
+    whole = example_design()
+    free = replace(whole.motion, joint_angles=np.zeros((21, 0)), joint_names=())
+    Design(task=whole.task, status="failed", reason="stopped", motion=free).save(tmp_path / "floating")
+    assert {path.name for path in (tmp_path / "floating").iterdir()} == FILES - {"hand.urdf", "scene.xml"}
+    Design(task=whole.task, status="failed", reason="stopped", hand=whole.hand).save(tmp_path / "synthesis")
+    assert {path.name for path in (tmp_path / "synthesis").iterdir()} == FILES - {"motion.npz", "scene.xml"}
+    assert Design.load(tmp_path / "floating").hand is None
+    assert Design.load(tmp_path / "synthesis").motion is None
+    assert Design.load(tmp_path / "synthesis").hand == whole.hand
+
+
+def test_a_smaller_design_leaves_nothing_of_the_one_before(saved):
+    Design(task=parse_task(TASK), status="failed", reason="nothing tried").save(saved)
+    assert {path.name for path in saved.iterdir()} == {"task.yaml", "object.urdf", "result.json", "viewer.html"}
+
+
+def test_numbers_that_are_not_finite_are_null(tmp_path):
+    stages = [{"objective": float("nan"), "seconds": np.float64(2.5), "iterations": np.int64(3), "inf": float("inf")}]
+    replace(example_design(), stages=stages).save(tmp_path)
+    assert record(tmp_path)["stages"] == [{"objective": None, "seconds": 2.5, "iterations": 3, "inf": None}]
+
+
+def test_an_unknown_status_is_refused(tmp_path):
+    with pytest.raises(DesignError, match="certified, feasible, failed, not 'good'"):
+        replace(example_design(), status="good").save(tmp_path)
+
+
+def test_a_file_in_the_way_is_reported(tmp_path):
+    (tmp_path / "out").write_text("")
+    with pytest.raises(DesignError, match="cannot write the design here"):
+        example_design().save(tmp_path / "out")
+
+
+def edit(folder, **changes):
+    (folder / "result.json").write_text(json.dumps({**record(folder), **changes}))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda folder: (folder / "result.json").unlink(), "no result.json"),
+        (lambda folder: (folder / "motion.npz").unlink(), "motion.npz: not a motion file"),
+        (lambda folder: (folder / "task.yaml").unlink(), "task cannot be read"),
+        (lambda folder: (folder / "result.json").write_text("{"), "cannot be read"),
+        (lambda folder: edit(folder, format=2), "its format is 2; this version reads format 1"),
+        (lambda folder: edit(folder, hand={"palm": {}}), "the hand lacks 'radius'"),
+    ],
+)
+def test_a_spoilt_folder_is_refused(saved, spoil, message):
+    spoil(saved)
+    with pytest.raises(DesignError, match=message):
+        Design.load(saved)
+
+
+def test_a_folder_that_is_not_there_is_refused(tmp_path):
+    with pytest.raises(DesignError, match="there is no such folder"):
+        Design.load(tmp_path / "nowhere")
+
+
+def test_a_motion_of_another_hand_is_refused(saved):
+    result = record(saved)
+    result["hand"]["fingers"].pop()
+    edit(saved, hand=result["hand"])
+    with pytest.raises(DesignError, match="moves other joints"):
+        Design.load(saved)
