@@ -1,0 +1,192 @@
+"""The replay's two sides: what the hand's controller knows of the plan, and the simulated world it acts in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+from scipy.spatial.transform import Rotation, Slerp
+
+from casadi_hands.errors import DesignError, HandsError
+from casadi_hands.verify.dynamics import object_rotation, shoot
+from casadi_hands.verify.folder import Folder
+from casadi_hands.verify.perturb import Perturbation
+from casadi_hands.verify.trajectory import build_trajectory
+from casadi_hands.verify.wrench import planned_torques
+
+SQUEEZE, RELEASE = 0.3, 0.2
+"""s before the motion: the squeeze builds up while the object is held, then the support fades."""
+
+SUPPORT = 60.0
+"""rad/s, natural frequency of the support on the object's mass; critically damped."""
+
+
+Observer = Callable[[Any, Any], None]
+"""Called with MuJoCo's model and data after every step."""
+
+
+class Plan:
+    """The motion at every step of the simulation, ``T`` of them from the first sample to the last.
+
+    Attributes:
+        angles, speeds, torques: (T, J) rad, rad/s, and N·m that press the contacts as planned.
+        palm_position, palm_quaternion: (T, 3) m and (T, 4) [w, x, y, z], world.
+        external_force, external_torque: (T, 3) what the task itself applies to the object, N and N·m, world.
+    """
+
+    def __init__(self, folder: Folder, step: float) -> None:
+        """Rebuild the motion ``step`` seconds apart."""
+        motion = folder.motion
+        path = build_trajectory(folder, shoot(folder))
+        time = np.minimum(np.arange(motion.time[0], motion.time[-1] + step, step), motion.time[-1])
+
+        def dense(values: np.ndarray) -> np.ndarray:
+            return np.asarray(make_interp_spline(path.time, values, k=1)(time))
+
+        def coarse(values: np.ndarray) -> np.ndarray:
+            return np.asarray(make_interp_spline(motion.time, values, k=1)(time))
+
+        self.angles, self.speeds = dense(path.joints), dense(path.speeds)
+        self.torques = coarse(planned_torques(folder))
+        self.external_force, self.external_torque = coarse(motion.external_force), coarse(motion.external_torque)
+        self.palm_position, self._object_position = dense(path.placed["palm"][1]), dense(path.placed["object"][1])
+        palm, item = (Slerp(path.time, Rotation.from_matrix(path.placed[who][0]))(time) for who in ("palm", "object"))
+        self.palm_quaternion = palm.as_quat(scalar_first=True)
+        self._object_quaternion = item.as_quat(scalar_first=True)
+
+    def __len__(self) -> int:
+        """Return the number of steps."""
+        return len(self.angles)
+
+    def error(self, i: int, position: np.ndarray, quaternion: np.ndarray) -> tuple[float, float]:
+        """Return the distance (m) and angle (deg) of the object's pose from its plan at a step."""
+        away = float(np.linalg.norm(position - self._object_position[i]))
+        cosine = min(abs(float(quaternion @ self._object_quaternion[i])), 1.0)
+        return away, float(np.rad2deg(2 * np.arccos(cosine)))
+
+
+class Simulation:
+    """MuJoCo's model and state of ``scene.xml``, perturbed.
+
+    Attributes:
+        step: s.
+    """
+
+    def __init__(self, folder: Folder, perturbation: Perturbation) -> None:
+        """Load ``scene.xml`` and put everything at its start.
+
+        Raises:
+            DesignError: the scene is missing, unreadable, or not of this hand.
+            HandsError: MuJoCo is not installed.
+        """
+        try:
+            import mujoco
+        except ImportError:
+            raise HandsError("replay needs MuJoCo: pip install 'casadi-hands[sim]'") from None
+        self._mujoco = mujoco
+        file = folder.path / "scene.xml"
+        try:
+            self.model = mujoco.MjModel.from_xml_path(str(file))
+        except ValueError as error:
+            raise DesignError(f"{file}: {error}") from None
+        self._find(folder, file)
+        self._bias = np.asarray(perturbation.joint_bias or np.zeros(len(folder.motion.joint_names)))
+        self.model.body_mass[self._object] *= perturbation.mass
+        self.model.body_inertia[self._object] *= perturbation.mass
+        self.model.geom_friction *= perturbation.friction
+        self.data = mujoco.MjData(self.model)
+        mujoco.mj_setConst(self.model, self.data)
+        self._place(folder, perturbation)
+        self.step = float(self.model.opt.timestep)
+
+    def _find(self, folder: Folder, file: Path) -> None:
+        """Look up by name what the replay touches."""
+        kinds, model = self._mujoco.mjtObj, self.model
+        find = partial(self._mujoco.mj_name2id, model)
+        self._object = find(kinds.mjOBJ_BODY, "object")
+        self._links = {name: find(kinds.mjOBJ_BODY, name) for name in folder.links}
+        self._links["ground"] = 0
+        target = find(kinds.mjOBJ_BODY, "palm_target")
+        self._mocap = int(model.body_mocapid[target]) if target >= 0 else -1
+        joints = [find(kinds.mjOBJ_JOINT, name) for name in folder.motion.joint_names]
+        driven = model.actuator_trnid[:, 0].tolist()
+        if self._object < 0 or -1 in self._links.values() or any(joint not in driven for joint in joints):
+            raise DesignError(f"{file}: it lacks the object, a link, a joint or an actuator of this hand")
+        self._actuators = [driven.index(joint) for joint in joints]
+        self._angles = [int(model.jnt_qposadr[joint]) for joint in joints]
+        self._stiffness = model.actuator_gainprm[self._actuators, 0]
+        self._damping = -model.actuator_biasprm[self._actuators, 2]
+        free = int(model.body_jntadr[self._object])
+        self._pose, self._twist = int(model.jnt_qposadr[free]), int(model.jnt_dofadr[free])
+
+    def _place(self, folder: Folder, perturbation: Perturbation) -> None:
+        """Put everything at the motion's first sample, the object off it as the perturbation says."""
+        self._mujoco.mj_resetDataKeyframe(
+            self.model, self.data, self._mujoco.mj_name2id(self.model, self._mujoco.mjtObj.mjOBJ_KEY, "start")
+        )
+        self.data.qpos[self._angles] = folder.motion.joint_angles[0] + self._bias
+        turn = Rotation.from_rotvec(perturbation.start_turn) * object_rotation(folder)[0]
+        self._home = folder.motion.object_position[0] + np.asarray(perturbation.start_shift), turn
+        self.data.qpos[self._pose : self._pose + 3] = self._home[0]
+        self.data.qpos[self._pose + 3 : self._pose + 7] = turn.as_quat(scalar_first=True)
+        self._mujoco.mj_forward(self.model, self.data)
+
+    def object_pose(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the object's position (3,) and quaternion (4,) [w, x, y, z], world."""
+        at = self._pose
+        return self.data.qpos[at : at + 3], self.data.qpos[at + 3 : at + 7]
+
+    def touches(self, link: str) -> bool:
+        """Whether the object touches any link of the contact's finger (or the ground)."""
+        finger = link.partition("_link")[0]
+        bodies = {body for name, body in self._links.items() if name.partition("_link")[0] == finger}
+        for contact in self.data.contact:
+            pair = {int(self.model.geom_bodyid[geom]) for geom in contact.geom}
+            if self._object in pair and pair & bodies:
+                return True
+        return False
+
+    def settle(self, plan: Plan, observer: Observer | None) -> None:
+        """Build up the squeeze at the start pose while a soft support holds the object, then let go."""
+        for i in range(round((SQUEEZE + RELEASE) / self.step)):
+            time = i * self.step
+            force, torque = self._support(1.0 - max(0.0, time - SQUEEZE) / RELEASE)
+            self._follow(plan, 0, min(time / SQUEEZE, 1.0), moving=False)
+            self._advance(plan.external_force[0] + force, plan.external_torque[0] + torque, observer)
+
+    def _support(self, share: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return a share of the spring force and torque that hold the object at its start, weight included."""
+        mass, inertia = self.model.body_mass[self._object], float(np.max(self.model.body_inertia[self._object]))
+        position, quaternion = self.object_pose()
+        turn = Rotation.from_quat(quaternion, scalar_first=True)
+        velocity = self.data.qvel[self._twist : self._twist + 3]
+        rate = turn.apply(self.data.qvel[self._twist + 3 : self._twist + 6])
+        off = position - self._home[0]
+        turned = (turn * self._home[1].inv()).as_rotvec()
+        force = mass * (-(SUPPORT**2) * off - 2 * SUPPORT * velocity)
+        torque = inertia * (-(SUPPORT**2) * turned - 2 * SUPPORT * rate)
+        return share * force, share * torque
+
+    def play(self, plan: Plan, i: int, push: np.ndarray, observer: Observer | None) -> None:
+        """Drive the hand as planned for a step, and make it; ``push`` (3,) is a force on the object, N, world."""
+        self._follow(plan, i, 1.0, moving=True)
+        self._advance(plan.external_force[i] + push, plan.external_torque[i], observer)
+
+    def _follow(self, plan: Plan, i: int, squeeze: float, moving: bool) -> None:
+        """Set the motors' targets for a step, with a share of the planned torques."""
+        ahead = squeeze * plan.torques[i] + (self._damping * plan.speeds[i] if moving else 0.0)
+        self.data.ctrl[self._actuators] = plan.angles[i] + self._bias + ahead / self._stiffness
+        if self._mocap >= 0:
+            self.data.mocap_pos[self._mocap] = plan.palm_position[i]
+            self.data.mocap_quat[self._mocap] = plan.palm_quaternion[i]
+
+    def _advance(self, force: np.ndarray, torque: np.ndarray, observer: Observer | None) -> None:
+        self.data.xfrc_applied[self._object, :3] = force
+        self.data.xfrc_applied[self._object, 3:] = torque
+        self._mujoco.mj_step(self.model, self.data)
+        if observer is not None:
+            observer(self.model, self.data)
