@@ -11,15 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from casadi_hands.kinematics import finger_kinematics
-from casadi_hands.stages.finger_symbols import tip_point
+from casadi_hands.stages.finger_numbers import contact_kinematics
 from casadi_hands.stages.grasp import friction_edges, grasp_map
-from casadi_hands.stages.synthesis import FingerSeed, Synthesised
+from casadi_hands.stages.synthesis import Synthesised
 from casadi_hands.stages.target import Target
 from casadi_hands.terms.finger import NULL_SPACE_DAMPING
 
@@ -32,7 +30,10 @@ _STAY = 0.005  # weight of staying with the planned forces, which bounds the squ
 
 def finger_scores(target: Target, hand: Synthesised) -> Array:
     """Score (F,) of each finger: 50·(tip distance in half extents)² plus passive force in m·g, keyframe means."""
-    placed = [place(target, finger, contact) for finger, contact in zip(hand.fingers, hand.contacts, strict=True)]
+    placed = [
+        contact_kinematics(finger, target.string_of(contact), target.link_radius)
+        for finger, contact in zip(hand.fingers, hand.contacts, strict=True)
+    ]
     scores = np.zeros(len(placed))
     for i, contact in enumerate(hand.contacts):
         active = target.active[:, contact]
@@ -45,20 +46,6 @@ def finger_scores(target: Target, hand: Synthesised) -> Array:
         active = target.active[:, contact]
         scores[i] += float(passive[active, i].mean()) if active.any() else 0.0
     return scores
-
-
-def place(target: Target, finger: FingerSeed, contact: int) -> tuple[Array, Array]:
-    """Contact points (N, 3) and their Jacobians (N, 3, n) at the keyframes, palm frame."""
-    function = finger_kinematics(finger.joints)
-    strings = target.string_of(contact)
-    points, jacobians = [], []
-    for k, angles in enumerate(finger.angles):
-        on_link, _ = tip_point(ca.DM(finger.tips[strings[k]]), finger.lengths[-1], target.link_radius)
-        base = np.append(finger.base, 0)
-        *_, point, jacobian = function(base, finger.axis_vectors.T, finger.lengths, angles, on_link)
-        points.append(np.asarray(point).reshape(-1))
-        jacobians.append(np.asarray(jacobian))
-    return np.array(points), np.array(jacobians)
 
 
 def passive_projector(jacobian: Array) -> Array:

@@ -18,6 +18,30 @@ def placed(pose: SX, reference: SX) -> tuple[SX, SX]:
     return pose[:3], multiply(exponential(pose[3:]), reference)
 
 
+class Palm:
+    """The palm's pose at one time: given, plus an offset where the task lets it move.
+
+    Args:
+        kernel: where the symbols are declared.
+        moves: whether the palm's offset (6,) - a translation and a rotation vector, world - is a variable.
+        tag: appended to the names.
+    """
+
+    def __init__(self, kernel: Kernel, moves: bool, tag: str = "") -> None:
+        offset = kernel.variable(f"palm{tag}", 6) if moves else SX.zeros(6, 1)
+        self.position = kernel.parameter(f"palm_position{tag}", 3) + offset[:3]
+        given = kernel.parameter(f"palm_quaternion{tag}", 4)
+        self.quaternion = multiply(exponential(offset[3:]), given) if moves else given
+
+    def sees(self, point: SX) -> SX:
+        """A world point (3,) in the palm frame."""
+        return ca.mtimes(rotation_matrix(conjugate(self.quaternion)), point - self.position)
+
+    def turned(self, vector: SX) -> SX:
+        """A world vector (3,) in palm axes."""
+        return ca.mtimes(rotation_matrix(conjugate(self.quaternion)), vector)
+
+
 def dynamics(contacts: int, suffix: str = "", regularise: bool = True) -> Kernel:
     """Newton–Euler at one sample (eq. 2.5, 2.6) and the object's accelerations (eq. 2.14, 2.15).
 
@@ -147,21 +171,18 @@ def capsule_in(pose_position: SX, rotation: SX, capsule: SX) -> tuple[SX, SX]:
     return pose_position + ca.mtimes(rotation, capsule[:3]), pose_position + ca.mtimes(rotation, capsule[3:6])
 
 
-def palm_clearance() -> Kernel:
+def palm_clearance(moves: bool) -> Kernel:
     """One primitive of the object against palm and ground at one sample (section 3.2.3)."""
     kernel = Kernel("palm_clearance")
     pose = kernel.variable("pose", 6)
+    palm = Palm(kernel, moves)
     reference, capsule = kernel.parameter("reference", 4), kernel.parameter("capsule", 7)
-    palm_position, palm_quaternion, palm_radius = (
-        kernel.parameter(n, k) for n, k in (("palm_position", 3), ("palm_quaternion", 4), ("palm_radius", 1))
-    )
-    ground, margin = kernel.parameter("ground"), kernel.parameter("margin")
+    palm_radius, ground, margin = (kernel.parameter(name) for name in ("palm_radius", "ground", "margin"))
     position, quaternion = placed(pose, reference)
-    to_palm = rotation_matrix(conjugate(palm_quaternion))
     ends = capsule_in(position, rotation_matrix(quaternion), capsule)
     costs: list[SX] = []
     for point in (ends[0], (ends[0] + ends[1]) / 2, ends[1]):
-        distance = point_disc_distance(ca.mtimes(to_palm, point - palm_position), palm_radius) - capsule[6]
+        distance = point_disc_distance(palm.sees(point), palm_radius) - capsule[6]
         costs.append(penalty_spline(margin - distance, CLEARANCE_ROUNDING))
         costs.append(penalty_spline(ground - (point[2] - capsule[6]), CLEARANCE_ROUNDING))
     kernel.cost("palm_clearance", ca.vertcat(*costs), "sum")

@@ -79,8 +79,11 @@ def declare_object(problem: Problem, model: Model) -> ObjectSide:
     )
 
 
-def bind_object(problem: Problem, model: Model, side: ObjectSide) -> None:
-    """Bind every kernel of the object's side; parameters are those of ``object_parameters``."""
+def bind_object(problem: Problem, model: Model, side: ObjectSide, palm: Rows | None = None) -> None:
+    """Bind every kernel of the object's side; parameters are those of ``object_parameters``.
+
+    ``palm`` is the offset (N, 6) of a palm that may move.
+    """
     for name, width in (("reference", 4), ("step", 1), ("gravity", 3), ("nothing", 3), ("inertia", 9), ("inertial", 1)):
         problem.parameter(name, (1, width))
     for name in ("friction", "sharpness", "clearance", "ground_height"):
@@ -90,7 +93,7 @@ def bind_object(problem: Problem, model: Model, side: ObjectSide) -> None:
         _bind_scenario(problem, model, side, side.perturbed, "_perturbed")
     _bind_points(problem, model, side)
     _bind_goals(problem, model, side)
-    _bind_clearance(problem, model, side)
+    _bind_clearance(problem, model, side, palm)
 
 
 def _bind_scenario(problem: Problem, model: Model, side: ObjectSide, force: Rows, suffix: str) -> None:
@@ -145,15 +148,16 @@ def _bind_goals(problem: Problem, model: Model, side: ObjectSide) -> None:
     problem.bind(kernels.straight_path(), [side.keyframe_pose], [straight])
 
 
-def _bind_clearance(problem: Problem, model: Model, side: ObjectSide) -> None:
+def _bind_clearance(problem: Problem, model: Model, side: ObjectSide, palm: Rows | None) -> None:
     p, samples = problem.parameters, sizes(model)[1]
-    palm = [problem.parameter(f"palm_{n}", (samples, k)) for n, k in (("position", 3), ("quaternion", 4))]
+    given = [problem.parameter(f"palm_{n}", (samples, k)) for n, k in (("position", 3), ("quaternion", 4))]
     radius = problem.parameter("palm_radius", (1, 1))
     primitives = problem.parameter("primitives", (len(model.primitives), 7))
-    kernel = kernels.palm_clearance()
+    kernel = kernels.palm_clearance(moves=palm is not None)
+    rows = [side.pose[1]] if palm is None else [side.pose[1], palm.combine(model.schedule.spline())]
     for i in range(len(model.primitives)):
-        parameters = [p["reference"], primitives[i : i + 1], *palm, radius, p["ground_height"], p["clearance"]]
-        problem.bind(kernel, [side.pose[1]], parameters)
+        parameters = [*given, p["reference"], primitives[i : i + 1], radius, p["ground_height"], p["clearance"]]
+        problem.bind(kernel, rows, parameters)
 
 
 def straight_path(model: Model) -> Array:

@@ -76,11 +76,8 @@ class Target:
         return self.link_radius * np.pi / 2 + 0.3 * self.link_length[0]
 
     def string_of(self, contact: int) -> NDArray[np.int64]:
-        """For each keyframe (N,) the string of active keyframes it belongs to; idle ones count with the next."""
-        active = self.active[:, contact]
-        starts = active & ~np.concatenate([[False], active[:-1]])
-        strings = np.cumsum(starts) - 1
-        return np.clip(np.where(active, strings, strings + 1), 0, max(int(starts.sum()) - 1, 0))
+        """For each keyframe (N,) the string of a contact's active keyframes it belongs to."""
+        return string_of(self.active[:, contact])
 
     def strings(self, contact: int) -> int:
         """Number of strings of a contact, at least 1."""
@@ -105,6 +102,13 @@ class Target:
             height = _NO_GROUND if model.ground is None else model.ground.height
             offset.append(height - position[2])
         return np.array(primitives), np.array(up), np.array(offset)
+
+
+def string_of(active: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """For each keyframe (N,) of one contact the string of active keyframes it belongs to; idle ones count with the next."""
+    starts = active & ~np.concatenate([[False], active[:-1]])
+    strings = np.cumsum(starts) - 1
+    return np.clip(np.where(active, strings, strings + 1), 0, max(int(starts.sum()) - 1, 0))
 
 
 def palm_from_world(model: Model, time: float) -> tuple[Array, Array]:

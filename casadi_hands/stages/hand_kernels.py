@@ -1,0 +1,127 @@
+"""The blocks of the hand's side in the whole-hand stage: one finger at one sample, and pairs of bodies."""
+
+from __future__ import annotations
+
+import casadi as ca
+from casadi import SX
+
+from casadi_hands.geometry import penalty_spline, project_to_capsule
+from casadi_hands.motion import rotation_matrix
+from casadi_hands.nlp import Kernel
+from casadi_hands.stages.finger_symbols import FingerSymbols, PlacedFinger, morphology
+from casadi_hands.stages.kernels import Palm, placed
+from casadi_hands.terms import clearance, contact, finger
+
+ROUNDING = 1e-3
+
+
+def given_morphology(kernel: Kernel, joints: int, tag: str = "") -> FingerSymbols:
+    """A finger whose morphology is parameters: seed frames, base, lengths, axis coordinates."""
+    frames = kernel.parameter(f"frames{tag}", 9 * joints)
+    return morphology(kernel.parameter, frames, joints, tag)
+
+
+def touch(joints: int, moves: bool) -> Kernel:
+    """One finger and its contact at one sample (Table 2.4): all that ties the contact to the finger."""
+    kernel = Kernel("touch")
+    pose, pose_before = kernel.variable("pose", 6), kernel.variable("pose_before", 6)
+    point, force, activity = kernel.variable("point", 3), kernel.variable("force", 3), kernel.variable("activity", 1)
+    angles, angles_before = kernel.variable("angles", joints), kernel.variable("angles_before", joints)
+    palm, palm_before = Palm(kernel, moves), Palm(kernel, moves, "_before")
+    symbols = given_morphology(kernel, joints)
+    reference, radius, friction, sharpness, step = (
+        kernel.parameter(n, k) for n, k in (("reference", 4), ("radius", 1), ("friction", 1), ("sharpness", 1), ("step", 1))
+    )
+    position, quaternion = placed(pose, reference)
+    rotation = rotation_matrix(quaternion)
+    in_palm = palm.sees(position + ca.mtimes(rotation, point))
+    skeleton = symbols.placed(angles)
+    last = skeleton.origins[:, -1]
+    on_link = ca.mtimes(skeleton.tip_rotation.T, in_palm - last)
+    here = symbols.placed(angles, on_link)
+    projection, normal, _ = project_to_capsule(on_link, SX.zeros(3, 1), ca.vertcat(0, 0, symbols.lengths[-1]), radius)
+    force_in_palm = palm.turned(ca.mtimes(rotation, force))
+    kernel.cost("contact_on_finger", contact.off_surface(force, activity, on_link, projection), "sum")
+    position_before, quaternion_before = placed(pose_before, reference)
+    object_moved = in_palm - palm_before.sees(position_before + ca.mtimes(rotation_matrix(quaternion_before), point))
+    finger_moved = in_palm - symbols.placed(angles_before, on_link).contact
+    kernel.cost("slip_on_finger", contact.slip(force, activity, object_moved, finger_moved, step))
+    cone = contact.friction_cone(force_in_palm, ca.mtimes(here.tip_rotation, normal), friction, sharpness)
+    kernel.cost("friction_cone_hand", activity * cone, "sum")
+    kernel.cost("null_space", activity * finger.null_space(here.jacobian, force_in_palm), "sum")
+    kernel.cost("torque", activity * finger.joint_torques(here.jacobian, force_in_palm))
+    return kernel
+
+
+def move(joints: int) -> Kernel:
+    """One finger's joints at one sample: eq. 2.26 for all tips, and eq. 2.27 as a plain square outside the limits."""
+    kernel = Kernel("move")
+    angles = [kernel.variable(f"angles{i}", joints) for i in range(3)]
+    symbols = given_morphology(kernel, joints)
+    lowest, highest, step = kernel.parameter("lowest"), kernel.parameter("highest"), kernel.parameter("step")
+    tips = [symbols.placed(a).tip for a in angles]
+    kernel.cost("finger_acceleration", finger.tip_acceleration(*tips, step))
+    kernel.cost("joint_limits", ca.vertcat(ca.fmax(angles[1] - highest, 0), ca.fmax(lowest - angles[1], 0)))
+    return kernel
+
+
+def object_clearance(joints: int, primitives: int, moves: bool) -> Kernel:
+    """One finger against object, palm, ground and itself at one sample (eq. 2.20)."""
+    kernel = Kernel("object_clearance")
+    pose, angles = kernel.variable("pose", 6), kernel.variable("angles", joints)
+    palm = Palm(kernel, moves)
+    symbols = given_morphology(kernel, joints)
+    reference, radius, palm_radius = kernel.parameter("reference", 4), kernel.parameter("radius"), kernel.parameter("palm_radius")
+    ground, margin = kernel.parameter("ground"), kernel.parameter("margin")
+    shapes = ca.reshape(kernel.parameter("primitives", 7 * primitives), 7, primitives)
+    position, quaternion = placed(pose, reference)
+    rotation = rotation_matrix(quaternion)
+
+    def seen(end: SX) -> SX:
+        return palm.sees(position + ca.mtimes(rotation, end))
+
+    in_palm = ca.horzcat(
+        *[ca.vertcat(seen(shapes[:3, k]), seen(shapes[3:6, k]), shapes[6, k]) for k in range(primitives)]
+    )
+    here = symbols.placed(angles)
+    up = palm.turned(SX([0, 0, 1]))
+    apart, touching = distances(here, radius, palm_radius, in_palm, up, ground - palm.position[2])
+    overlaps = ca.vertcat(margin - apart, -touching)
+    kernel.cost("collision", penalty_spline(overlaps, ROUNDING), "sum")
+    return kernel
+
+
+def distances(
+    here: PlacedFinger, radius: SX, palm_radius: SX, primitives: SX, up: SX, ground: SX
+) -> tuple[SX, SX]:
+    """Distances between one finger and all but other fingers: those to keep apart, and the touching link's (K,)."""
+    ends = here.ends
+    apart = [
+        clearance.links_and_palm(ends, radius, palm_radius),
+        clearance.links_and_ground(ends, radius, up, ground),
+        clearance.links_of_one(ends, radius),
+    ]
+    if len(ends) > 1:
+        apart.append(clearance.links_and_object(ends[:-1], radius, primitives))
+    return ca.vertcat(*apart), clearance.links_and_object(ends[-1:], radius, primitives)
+
+
+def finger_clearance(joints: int, other_joints: int) -> Kernel:
+    """Two fingers against each other at one sample (eq. 2.20)."""
+    kernel = Kernel("finger_clearance")
+    angles, other_angles = kernel.variable("angles_a", joints), kernel.variable("angles_b", other_joints)
+    first, second = given_morphology(kernel, joints, "_a"), given_morphology(kernel, other_joints, "_b")
+    radius, margin = kernel.parameter("radius"), kernel.parameter("margin")
+    apart = clearance.links_and_links(first.placed(angles).ends, second.placed(other_angles).ends, radius)
+    kernel.cost("collision", penalty_spline(margin - apart, ROUNDING), "sum")
+    return kernel
+
+
+def palm_motion() -> Kernel:
+    """A moving palm at one keyframe: acceleration of its offset, and a weak pull to the given motion."""
+    kernel = Kernel("palm_motion")
+    before, now, after = (kernel.variable(f"palm{i}", 6) for i in range(3))
+    step = kernel.parameter("step")
+    kernel.cost("base_acceleration", ca.vertcat((after - 2 * now + before) / step**2, 0.1 * now))
+    return kernel
+

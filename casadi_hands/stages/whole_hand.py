@@ -1,0 +1,227 @@
+"""Stage 3: object, contacts and joints together, the morphology fixed (section 2.2.4)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from casadi_hands.motion import catmull_rom
+from casadi_hands.nlp import Options, Problem, Rows, Solution, Solver
+from casadi_hands.stages import hand_kernels as kernels
+from casadi_hands.stages.finger_numbers import contact_kinematics
+from casadi_hands.stages.floating import Floating
+from casadi_hands.stages.grasp import inward_normals
+from casadi_hands.stages.model import Model, quaternion
+from casadi_hands.stages.object_side import (
+    NO_GROUND,
+    bind_object,
+    declare_object,
+    object_parameters,
+    pose_bounds,
+    sizes,
+    term_weights,
+)
+from casadi_hands.stages.synthesis import MARGIN, FingerSeed
+from casadi_hands.stages.target import on_capsules, palm_from_world, string_of
+
+Array = NDArray[np.float64]
+OPTIONS = Options(max_iter=200, tol=1e-4, acceptable_tol=1e-3)
+FARTHEST_PALM = 2.0  # half extents and rad, how far a palm that may move leaves its given motion
+
+
+@dataclass(frozen=True)
+class WholeHand:
+    """A motion of object and hand at the samples; nondimensional, see ``Model``.
+
+    Attributes:
+        fingers: morphology, one for each contact in ``contacts``; their ``angles`` are at the keyframes.
+        contacts: index of each finger's contact.
+        pose: (N, 6) of the object at the keyframes.
+        angles: for each finger (S, n), rad.
+        palm_position: (S, 3) world.
+        palm_quaternion: (S, 4).
+        position: (S, 3) of the object, world.
+        vector: (S, 3) its rotation vector from the reference.
+        point: (S, C, 3) contacts on the object, object frame.
+        force: (S, C, 3) object frame.
+        active: (S, C) bool.
+        solution: of the solver.
+    """
+
+    fingers: tuple[FingerSeed, ...]
+    contacts: tuple[int, ...]
+    pose: Array
+    angles: tuple[Array, ...]
+    palm_position: Array
+    palm_quaternion: Array
+    position: Array
+    vector: Array
+    point: Array
+    force: Array
+    active: NDArray[np.bool_]
+    solution: Solution
+
+
+class WholeHandStage:
+    """The stage's problem for one structure: a number of joints for each finger."""
+
+    def __init__(self, model: Model, contacts: tuple[int, ...], joints: tuple[int, ...], palm_moves: bool) -> None:
+        self.model, self.contacts, self.joints, self.palm_moves = model, contacts, joints, palm_moves
+        self.problem = problem = Problem()
+        schedule = model.schedule
+        keyframes, samples, _ = sizes(model)
+        side = declare_object(problem, model)
+        angles = {
+            c: problem.variable(f"angles{c}", (keyframes, n), *model.joint_limits)
+            for c, n in zip(contacts, joints, strict=True)
+        }
+        palm: Rows | None = None
+        if palm_moves:
+            palm = problem.variable("palm", (keyframes, 6), -FARTHEST_PALM, FARTHEST_PALM)
+        bind_object(problem, model, side, palm)
+        for name in ("link_radius", "lowest", "highest", "margin"):
+            problem.parameter(name, (1, 1))
+        problem.parameter("all_primitives", (1, 7 * len(model.primitives)))
+        for name, width in (("palm_position_before", 3), ("palm_quaternion_before", 4)):
+            problem.parameter(name, (samples, width))
+        at = {offset: schedule.spline(offset) for offset in (-1, 0, 1)}
+        palms = [] if palm is None else [palm.combine(schedule.spline(offset)) for offset in (0, -1)]
+        for c, n in zip(contacts, joints, strict=True):
+            self._declare_morphology(c, n)
+        p = problem.parameters
+        given = [p["palm_position"], p["palm_quaternion"]]
+        before = [p["palm_position_before"], p["palm_quaternion_before"]]
+        for i, (c, n) in enumerate(zip(contacts, joints, strict=True)):
+            shape, span = self._morphology(c), (3 * c, 3 * c + 3)
+            now = angles[c].combine(at[0])
+            rows = [side.pose[1], side.pose[0], side.point[1].entries(*span), side.force.entries(*span)]
+            rows += [side.activity.entries(c, c + 1), now, angles[c].combine(at[-1]), *palms]
+            tail = [p["reference"], p["link_radius"], p["friction"], p["sharpness"], p["step"]]
+            problem.bind(kernels.touch(n, palm_moves), rows, [*given, *before, *shape, *tail])
+            three = [angles[c].combine(at[offset]) for offset in (-1, 0, 1)]
+            problem.bind(kernels.move(n), three, [*shape, p["lowest"], p["highest"], p["step"]])
+            tail = [p[name] for name in ("reference", "link_radius", "palm_radius", "ground_height", "margin", "all_primitives")]
+            kernel = kernels.object_clearance(n, len(model.primitives), palm_moves)
+            problem.bind(kernel, [side.pose[1], now, *palms[:1]], [*given, *shape, *tail])
+            for d, m in zip(contacts[:i], joints[:i], strict=True):
+                kernel = kernels.finger_clearance(n, m)
+                both = [*shape, *self._morphology(d)]
+                problem.bind(kernel, [now, angles[d].combine(at[0])], [*both, p["link_radius"], p["margin"]])
+        if palm is not None:
+            inner = np.arange(keyframes)
+            three = [palm.take(np.clip(inner + offset, 0, keyframes - 1)) for offset in (-1, 0, 1)]
+            problem.parameter("keyframe_step", (1, 1))
+            problem.bind(kernels.palm_motion(), three, [p["keyframe_step"]])
+        self.solver = Solver(problem)
+
+    def _declare_morphology(self, contact: int, joints: int) -> None:
+        for name, width in (("frames", 9 * joints), ("base", 2), ("lengths", joints), ("axes", 2 * joints)):
+            self.problem.parameter(f"{name}{contact}", (1, width))
+
+    def _morphology(self, contact: int) -> list[NDArray[np.int64]]:
+        return [self.problem.parameters[f"{name}{contact}"] for name in ("frames", "base", "lengths", "axes")]
+
+    def solve(
+        self, floating: Floating, fingers: tuple[FingerSeed, ...], weights: Mapping[str, float], options: Options = OPTIONS
+    ) -> WholeHand:
+        """Start from stage 1's motion and stage 2's angles, contacts moved to the object's point nearest the fingertip's."""
+        model = self.model
+        flags = floating.active.astype(float)
+        start = {
+            "pose": floating.pose,
+            "point": self._start_points(floating, fingers).reshape(len(flags), -1),
+            "force": floating.force.reshape(len(floating.force), -1),
+            "activity": flags,
+            **{f"angles{c}": f.angles for c, f in zip(self.contacts, fingers, strict=True)},
+        }
+        if model.perturbed:
+            start["force_perturbed"] = floating.solution.values["force_perturbed"]
+        bounds = pose_bounds(model)
+        parameters = self._parameters(fingers) | term_weights(self.problem, model, weights)
+        solution = self.solver.solve(
+            start,
+            parameters,
+            options,
+            lower={"activity": flags, "pose": bounds[0]},
+            upper={"activity": flags, "pose": bounds[1]},
+        )
+        return self._result(solution, floating, fingers)
+
+    def _start_points(self, floating: Floating, fingers: tuple[FingerSeed, ...]) -> Array:
+        """Contact points (N, C, 3): the object's point nearest to each finger's contact of stage 2."""
+        model, points = self.model, floating.point.copy()
+        for finger, c in zip(fingers, self.contacts, strict=True):
+            touched, _ = contact_kinematics(finger, string_of(floating.active[:, c]), model.link_radius)
+            for k, in_palm in enumerate(touched):
+                rotation, position = palm_from_world(model, model.schedule.keyframes[k])
+                pose = floating.pose[k]
+                turn = pin.exp3(pose[3:]) @ pin.Quaternion(*model.reference).matrix()
+                local = turn.T @ (rotation.T @ in_palm + position - pose[:3])
+                capsule = model.capsules[c : c + 1]
+                points[k, c] = on_capsules(local[None], capsule, inward_normals(local[None], capsule))[0]
+        return points
+
+    def _parameters(self, fingers: tuple[FingerSeed, ...]) -> dict[str, Array | float]:
+        model = self.model
+        samples, step = model.schedule.samples, model.schedule.step
+        values = object_parameters(model)
+        values |= {
+            "link_radius": model.link_radius,
+            "lowest": model.joint_limits[0],
+            "highest": model.joint_limits[1],
+            "margin": MARGIN,
+            "all_primitives": model.primitives.reshape(1, -1),
+            "ground_height": NO_GROUND if model.ground is None else model.ground.height,
+        }
+        # A tenth of a second is short beside a palm's motion: the sample before stands for the time before.
+        previous = np.clip(np.searchsorted(samples, samples - step - 1e-9), 0, None)
+        values |= {"palm_position_before": model.palm_position[previous]}
+        values |= {"palm_quaternion_before": model.palm_quaternion[previous]}
+        for c, finger in zip(self.contacts, fingers, strict=True):
+            values[f"frames{c}"] = finger.frames.transpose(0, 2, 1).reshape(1, -1)
+            values[f"base{c}"], values[f"lengths{c}"] = finger.base, finger.lengths
+            values[f"axes{c}"] = finger.axes.reshape(1, -1)
+        if self.palm_moves:
+            values["keyframe_step"] = float(np.mean(np.diff(model.schedule.keyframes)))
+        return values
+
+    def _result(self, solution: Solution, floating: Floating, fingers: tuple[FingerSeed, ...]) -> WholeHand:
+        model, values, schedule = self.model, solution.values, self.model.schedule
+        contacts = sizes(model)[2]
+        pose = values["pose"]
+        at_samples = catmull_rom(schedule.keyframes, schedule.samples) @ pose
+        joined = catmull_rom(schedule.keyframes, schedule.samples)
+        moved = tuple(
+            FingerSeed(f.base, f.lengths, f.frames, f.axes, values[f"angles{c}"], f.tips)
+            for c, f in zip(self.contacts, fingers, strict=True)
+        )
+        position, orientation = model.palm_position, model.palm_quaternion
+        if self.palm_moves:
+            offset = catmull_rom(schedule.keyframes, schedule.samples) @ values["palm"]
+            position = position + offset[:, :3]
+            orientation = np.array([_turned(q, v) for q, v in zip(orientation, offset[:, 3:], strict=True)])
+        active = floating.active[schedule.sample_keyframes]
+        point = (catmull_rom(schedule.keyframes, schedule.samples) @ values["point"]).reshape(-1, contacts, 3)
+        return WholeHand(
+            fingers=moved,
+            contacts=self.contacts,
+            pose=pose,
+            angles=tuple(joined @ f.angles for f in moved),
+            palm_position=position,
+            palm_quaternion=orientation,
+            position=at_samples[:, :3],
+            vector=at_samples[:, 3:],
+            point=point,
+            force=values["force"].reshape(-1, contacts, 3) * active[:, :, None],
+            active=active,
+            solution=solution,
+        )
+
+
+def _turned(start: Array, vector: Array) -> Array:
+    """A quaternion turned further by a rotation vector in the world."""
+    return quaternion(pin.exp3(vector) @ pin.Quaternion(*start).matrix())
