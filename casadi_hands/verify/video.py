@@ -54,7 +54,7 @@ class _Camera:
         self.frames: list[np.ndarray] = []
         self._view = mujoco.MjvCamera()
         self._view.lookat[:] = 0.5 * (points.min(axis=0) + points.max(axis=0))
-        self._view.distance = 3.0 * float(np.ptp(points, axis=0).max()) + 6.0 * folder.length
+        self._view.distance = 1.6 * float(np.ptp(points, axis=0).max()) + 4.0 * folder.length
         self._view.azimuth, self._view.elevation = 120.0, -15.0
         self._renderer: Any = None
 
