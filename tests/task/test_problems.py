@@ -51,7 +51,12 @@ def test_same_motion_from_above_and_from_the_side() -> None:
     above, side = (
         load_task(PROBLEMS[0].with_name(f"tabletop_rotation_{name}.yaml")) for name in ("overhead", "from_the_side")
     )
-    assert (above.object, above.motion, above.fingers, above.ground) == (side.object, side.motion, side.fingers, side.ground)
+    assert (above.object, above.motion, above.fingers, above.ground) == (
+        side.object,
+        side.motion,
+        side.fingers,
+        side.ground,
+    )
     assert above.palm.facing != side.palm.facing
 
 
@@ -71,7 +76,9 @@ def lowest_height(task: Task, position: np.ndarray, vector: np.ndarray) -> float
 def holds(task: Task, vector: np.ndarray, push: np.ndarray, resting: bool) -> bool:
     """Whether contact forces within linearised cones balance gravity and the push (6,) on the object, by an LP."""
     turn = ScipyRotation.from_rotvec(vector)
-    contacts = [(turn.apply(f.touches), turn.apply(inward(task, f.touches)), task.friction) for f in task.fingers.values()]
+    contacts = [
+        (turn.apply(f.touches), turn.apply(inward(task, f.touches)), task.friction) for f in task.fingers.values()
+    ]
     if task.ground and resting:
         contacts.append((turn.apply(task.ground.touches), np.array([0.0, 0.0, 1.0]), task.ground.friction))
     columns = []

@@ -1,0 +1,60 @@
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation as ScipyRotation
+
+from casadi_hands.task import parse_task, task_to_yaml
+
+# A bolt whose frame is at the end of its shank: the centre of mass is somewhere along x.
+BOLT = """\
+object:
+  mass: 0.06
+  shapes:
+    - capsule: {start: [0, 0, 0], end: [0.05, 0, 0], radius: 0.01}
+    - sphere: {center: [0.055, 0, 0], radius: 0.016}
+palm: {position: [0, 0, 0.3], facing: [0, 0, -1]}
+motion:
+  - {at: 0, position: [0, 0, 0.2]}
+  - {at: 2, position: [0.01, 0, 0.2], rotation: {axis: [0, 0, 1], degrees: 90}}
+ground: {height: 0, touches: [0.01, 0, -0.0101]}
+fingers:
+  thumb: {touches: [0.03, 0.0103, 0]}
+  index: {touches: [0.03, -0.01, 0.001]}
+"""
+
+
+def test_points_keep_their_place_in_the_world() -> None:
+    task = parse_task(BOLT)
+    capsule, sphere = task.object.shapes
+    assert task.object.center_of_mass == (0, 0, 0)
+    # The solids' first moments cancel about the new origin.
+    assert capsule.volume * capsule.centroid + sphere.volume * sphere.centroid == pytest.approx(np.zeros(3), abs=1e-18)
+    start = capsule.segment[0]
+    shank_end = [[0, 0, 0.2], [0.01, 0, 0.2]]
+    for (_, position, vector), expected in zip(task.goal_poses(), shank_end, strict=True):
+        assert position + ScipyRotation.from_rotvec(vector).apply(start) == pytest.approx(expected)
+    assert np.array(task.fingers["thumb"].touches) - start == pytest.approx([0.03, 0.01, 0])
+    assert task.ground is not None
+    assert np.array(task.ground.touches) - start == pytest.approx([0.01, 0, -0.01])
+
+
+def test_contacts_are_moved_onto_the_nearest_surface() -> None:
+    task = parse_task(BOLT)
+    start = task.object.shapes[0].segment[0]
+    index = np.array(task.fingers["index"].touches) - start
+    direction = np.array([-0.01, 0.001]) / np.hypot(0.01, 0.001)
+    assert index == pytest.approx([0.03, *(0.01 * direction)])
+
+
+def test_given_centre_of_mass() -> None:
+    task = parse_task(BOLT.replace("mass: 0.06", "mass: 0.06\n  center_of_mass: [0.02, 0, 0.001]"))
+    assert task.object.center_of_mass == (0, 0, 0)
+    assert task.object.shapes[0].segment[0] == pytest.approx([-0.02, 0, -0.001])
+    # The inertia stays that of the solids about their own centre.
+    assert task.object.inertia == parse_task(BOLT).object.inertia
+
+
+def test_saving_and_loading_changes_nothing() -> None:
+    task = parse_task(BOLT)
+    again = parse_task(task_to_yaml(task))
+    assert again == task
+    assert task_to_yaml(again) == task_to_yaml(task)

@@ -1,0 +1,54 @@
+import coal
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation as ScipyRotation
+
+from casadi_hands.task import Capsule, Palm
+from casadi_hands.task.object import ManipulatedObject
+from casadi_hands.task.obstacles import depth_below, depth_in_palm, palm_depth_below
+
+BODY = ManipulatedObject(mass=1, shapes=(Capsule(start=(-0.03, 0, 0), end=(0.03, 0, 0), radius=0.01),))
+PALM = Palm.model_validate({"radius": 0.05, "position": (0.1, 0.2, 0.3), "facing": (1, -2, 1)})
+RNG = np.random.default_rng(3)
+
+
+def test_clearance_of_object_and_palm_agrees_with_coal() -> None:
+    disc = coal.Cylinder(PALM.radius, PALM.thickness)
+    placed = coal.Transform3s(PALM.rotation, np.array(PALM.position) - PALM.thickness / 2 * PALM.rotation[:, 2])
+    apart = 0
+    for turn in ScipyRotation.random(60, rng=5):
+        position = np.array(PALM.position) + RNG.uniform(-0.08, 0.08, 3)
+        # Coal's capsule lies along z, ours along x.
+        lying = (turn * ScipyRotation.from_euler("y", 90, degrees=True)).as_matrix()
+        found = coal.distance(
+            disc,
+            placed,
+            coal.Capsule(0.01, 0.06),
+            coal.Transform3s(lying, position),
+            coal.DistanceRequest(),
+            coal.DistanceResult(),
+        )
+        depth = depth_in_palm(BODY, position, turn.as_rotvec(), PALM)
+        # Overlapping, ours is the depth of the capsule's axis, Coal's that of the bodies: compare the sign.
+        assert (depth > 0) == (found < 0)
+        if found > 0:
+            assert depth == pytest.approx(-found, abs=1e-6)
+            apart += 1
+    assert 10 < apart < 55
+
+
+def test_depths_below_the_ground() -> None:
+    # The capsule stands on end, its lower end at 0.1 - 0.03 - 0.01.
+    upright = np.array([0, np.pi / 2, 0])
+    assert depth_below(BODY, np.array([0, 0, 0.1]), upright, 0.0) == pytest.approx(-0.06)
+    assert depth_below(BODY, np.array([0, 0, 0.1]), upright, 0.07) == pytest.approx(0.01)
+
+
+def test_palm_below_the_ground_agrees_with_points_of_its_rims() -> None:
+    angles = np.linspace(0, 2 * np.pi, 3601)
+    rim = PALM.radius * np.column_stack([np.cos(angles), np.sin(angles), 0 * angles])
+    points = np.vstack([rim, rim - [0, 0, PALM.thickness]])
+    for rotation in ScipyRotation.random(20, rng=7):
+        lowest = float((np.array([0, 0, 0.3]) + rotation.apply(points))[:, 2].min())
+        depth = palm_depth_below(PALM, np.array([0, 0, 0.3]), rotation.as_matrix(), 0.2)
+        assert depth == pytest.approx(0.2 - lowest, abs=1e-7)

@@ -1,0 +1,98 @@
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation as ScipyRotation
+
+from casadi_hands.task import Task, parse_task, task_to_yaml
+
+CAPSULE = """\
+object:
+  mass: {mass}
+  shapes:
+    - capsule: {{start: [0, 0, {low}], end: [0, 0, {high}], radius: {r2}}}
+palm: {{position: [0, 0, {h}], facing: [1, 0, 0]}}
+motion:
+  - {{at: 0, position: [{near}, 0, {h}]}}
+  - {{at: 2, position: [{far}, 0, {h}], rotation: {{axis: [1, 0, 0], degrees: 20}}}}
+fingers:
+  thumb: {{touches: [0, {r2}, 0]}}
+  index: {{touches: [0, -{r2}, 0]}}
+gravity: [0, 0, {g}]
+"""
+
+
+def capsule(scale: float = 1.0) -> Task:
+    lengths = {"low": -0.04, "high": 0.04, "r2": 0.02, "h": 0.3, "near": 0.1, "far": 0.15, "g": -9.81}
+    return parse_task(CAPSULE.format(mass=0.1, **{name: scale * value for name, value in lengths.items()}))
+
+
+def test_default_lengths_scale_with_the_file() -> None:
+    small, large = capsule(), capsule(10)
+    for name in ("radius", "thickness"):
+        assert getattr(large.palm, name) == pytest.approx(10 * getattr(small.palm, name), rel=1e-14)
+    assert large.hand.link_radius == pytest.approx(10 * small.hand.link_radius, rel=1e-14)
+    assert large.hand.link_length == pytest.approx([10 * length for length in small.hand.link_length], rel=1e-14)
+    assert large.force_unit == pytest.approx(10 * small.force_unit)
+
+
+def test_default_lengths_are_as_documented() -> None:
+    task = capsule()
+    radius = 1.2 * 0.06
+    contacts = ScipyRotation.from_euler("x", 20, degrees=True).apply([[0, 0.02, 0], [0, -0.02, 0]])
+    reach = np.linalg.norm(contacts + np.array([0.15, 0, 0]), axis=1).max()
+    assert task.palm.radius == pytest.approx(radius)
+    assert task.palm.thickness == pytest.approx(0.2 * radius)
+    assert task.hand.link_radius == pytest.approx(0.13 * radius)
+    assert task.hand.link_length == pytest.approx((0.26 * radius, radius + reach))
+    assert task.duration == 2
+
+
+def test_force_unit_with_gravity_off() -> None:
+    task = capsule().model_copy(update={"gravity": (0.0, 0.0, 0.0)})
+    assert task.force_unit == pytest.approx(0.981)
+
+
+def test_nothing_can_be_changed() -> None:
+    with pytest.raises(ValueError, match="frozen"):
+        capsule().friction = 1.0  # type: ignore[misc]
+
+
+def test_ground_defaults() -> None:
+    text = CAPSULE.format(mass=1, low=-0.04, high=0.04, r2=0.02, h=0.3, near=0.1, far=0.15, g=-9.81)
+    task = parse_task(text + "ground: {}\nfriction: 0.4\n")
+    assert task.ground is not None
+    assert (task.ground.height, task.ground.friction) == (0, 0.4)
+    assert task.ground.touches == pytest.approx((0, 0, -0.06))
+    assert parse_task(text + "ground: none\n").ground is None
+
+
+def test_goal_poses_of_a_drawing() -> None:
+    text = CAPSULE.format(mass=1, low=-0.04, high=0.04, r2=0.02, h=0.3, near=0.1, far=0.15, g=-9.81)
+    text = text.replace("position: [0.1", "tool_at: [0.1").replace("position: [0.15", "tool_at: [0.15")
+    text = text.replace(", rotation: {axis: [1, 0, 0], degrees: 20}", "") + "tool: [0, 0, -0.06]\n"
+    task = parse_task(text)
+    assert task.draws
+    times, positions, vectors = zip(*task.goal_poses(), strict=True)
+    assert times == (0, 2)
+    assert np.array(positions) == pytest.approx(np.array([[0.1, 0, 0.36], [0.15, 0, 0.36]]))
+    assert not np.any(vectors)
+    assert parse_task(task_to_yaml(task)) == task
+
+
+def test_whole_hand_inherits_the_floating_weights() -> None:
+    text = CAPSULE.format(mass=1, low=-0.04, high=0.04, r2=0.02, h=0.3, near=0.1, far=0.15, g=-9.81)
+    weights = parse_task(
+        text + "weights: {floating: {task: 7, slip_on_object: 3}, whole_hand: {raw_force: 2}}\n"
+    ).weights
+    assert weights.floating.task == weights.whole_hand["task"] == 7
+    # Table 2.4 names this one, so it does not follow the floating stage.
+    assert (weights.floating["slip_on_object"], weights.whole_hand.slip_on_object) == (3, 10)
+    assert (weights.floating.raw_force, weights.whole_hand.raw_force) == (0.01, 2)
+    assert dict(weights.synthesis)["tip_target"] == (50, 10, 50)
+    with pytest.raises(KeyError):
+        weights.floating["keys"]
+
+
+def test_every_field_is_described() -> None:
+    from casadi_hands.task.structure import walk
+
+    assert [path for path, field, _ in walk(Task) if not field.description or not field.description.endswith(".")] == []
