@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -38,10 +39,10 @@ class Schedule:
         """
         ends = list(goal_times) + ([duration] if duration > goal_times[-1] + 1e-9 else [])
         keyframes, samples = [ends[0]], [ends[0]]
-        for start, end in zip(ends[:-1], ends[1:], strict=True):
+        for start, end in itertools.pairwise(ends):
             inner = np.linspace(start, end, between + 2)
             keyframes += list(inner[1:])
-            for a, b in zip(inner[:-1], inner[1:], strict=True):
+            for a, b in itertools.pairwise(inner):
                 samples += list(np.linspace(a, b, max(1, math.ceil((b - a) / step - 1e-6)) + 1)[1:])
         goals = tuple(i * (between + 1) for i in range(len(goal_times)))
         return cls(np.array(keyframes), np.array(samples), goals, step)
@@ -66,5 +67,5 @@ class Schedule:
 
     def between(self, count: int) -> NDArray[np.float64]:
         """Times of the keyframes with ``count`` more between each pair, s."""
-        parts = [np.linspace(a, b, count + 2)[:-1] for a, b in zip(self.keyframes[:-1], self.keyframes[1:], strict=True)]
+        parts = [np.linspace(a, b, count + 2)[:-1] for a, b in itertools.pairwise(self.keyframes)]
         return np.append(np.concatenate(parts), self.keyframes[-1])

@@ -16,10 +16,11 @@ def _segment(knots: Weights, times: Weights) -> tuple[NDArray[np.int64], Weights
 
 def linear(knots: ArrayLike, times: ArrayLike) -> Weights:
     """Weights (T, N) of piecewise-linear interpolation; constant beyond the ends."""
-    knots, times = np.asarray(knots, float), np.clip(np.asarray(times, float), np.min(knots), np.max(knots))
-    index, fraction = _segment(knots, times)
-    weights = np.zeros((len(times), len(knots)))
-    rows = np.arange(len(times))
+    at = np.asarray(knots, float)
+    when = np.clip(np.asarray(times, float), at[0], at[-1])
+    index, fraction = _segment(at, when)
+    weights = np.zeros((len(when), len(at)))
+    rows = np.arange(len(when))
     weights[rows, index] = 1 - fraction
     weights[rows, index + 1] = fraction
     return weights
@@ -37,18 +38,18 @@ def catmull_rom(knots: ArrayLike, times: ArrayLike) -> Weights:
     The tangent at an inner knot is the slope between its neighbours. Times before the first knot and after the
     last see the motion's mirror image, which keeps central differences at the ends consistent.
     """
-    knots, times = np.asarray(knots, float), np.asarray(times, float).copy()
-    times = knots[0] + np.abs(times - knots[0])
-    times = knots[-1] - np.abs(knots[-1] - times)
-    index, s = _segment(knots, times)
-    count, rows = len(knots), np.arange(len(times))
+    at = np.asarray(knots, float)
+    when = at[0] + np.abs(np.asarray(times, float) - at[0])
+    when = at[-1] - np.abs(at[-1] - when)
+    index, s = _segment(at, when)
+    count, rows = len(at), np.arange(len(when))
     tangents = np.zeros((count, count))
     for i in range(1, count - 1):
-        span = knots[i + 1] - knots[i - 1]
-        tangents[i, i + 1], tangents[i, i - 1] = 1 / span, -1 / span
-    span = (knots[index + 1] - knots[index])[:, None]
+        slope = 1 / (at[i + 1] - at[i - 1])
+        tangents[i, i + 1], tangents[i, i - 1] = slope, -slope
+    span = (at[index + 1] - at[index])[:, None]
     s = s[:, None]
-    weights = (s**3 - 2 * s**2 + s) * span * tangents[index] + (s**3 - s**2) * span * tangents[index + 1]
+    weights: Weights = (s**3 - 2 * s**2 + s) * span * tangents[index] + (s**3 - s**2) * span * tangents[index + 1]
     weights[rows, index] += (2 * s**3 - 3 * s**2 + 1)[:, 0]
     weights[rows, index + 1] += (3 * s**2 - 2 * s**3)[:, 0]
     return weights

@@ -22,7 +22,8 @@ def to_dm(matrix: sparse.sparray) -> DM:
     """A SciPy sparse matrix as a CasADi one with the same pattern."""
     columns = sparse.csc_array(matrix)
     columns.sort_indices()
-    pattern = Sparsity(*matrix.shape, columns.indptr.tolist(), columns.indices.tolist())
+    height, width = matrix.shape
+    pattern = Sparsity(height, width, columns.indptr.tolist(), columns.indices.tolist())
     return DM(pattern, columns.data)
 
 
@@ -53,8 +54,7 @@ def kernel_functions(kernel: Kernel, terms: list[str]) -> dict[str, Function]:
 
 
 def _nonzeros(matrix: SX) -> SX:
-    nonzeros = matrix.nonzeros()
-    return ca.vertcat(*nonzeros) if nonzeros else SX.zeros(0, 1)
+    return ca.densify(matrix.nz[:]) if matrix.nnz() else SX.zeros(0, 1)
 
 
 def _expand(rows: sparse.csr_array, wanted: Indices) -> tuple[Indices, Indices, NDArray[np.float64]]:

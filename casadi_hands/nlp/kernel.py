@@ -13,12 +13,10 @@ class Kernel:
 
     Terms return residuals or plain values; the assembler weights, squares and sums them. Every term's weight is
     a parameter of the problem, ``weight.<term>``.
-
-    Args:
-        name: unique in its problem.
     """
 
     def __init__(self, name: str) -> None:
+        """Start without variables, parameters or terms; ``name`` appears in errors and names the constraints."""
         self.name = name
         self._variables: list[SX] = []
         self._parameters: list[SX] = []

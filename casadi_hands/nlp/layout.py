@@ -16,6 +16,7 @@ class Layout:
     """Packs named arrays into one vector and unpacks it; the only place that knows positions."""
 
     def __init__(self) -> None:
+        """Start empty."""
         self._indices: dict[str, NDArray[np.int64]] = {}
         self.size = 0
 
@@ -29,9 +30,11 @@ class Layout:
         return self._indices[name]
 
     def __getitem__(self, name: str) -> NDArray[np.int64]:
+        """Positions of an array's entries, in its shape."""
         return self._indices[name]
 
     def __contains__(self, name: str) -> bool:
+        """Whether an array has that name."""
         return name in self._indices
 
     def names(self) -> list[str]:
@@ -64,6 +67,7 @@ class Rows:
     """
 
     def __init__(self, matrix: Any, count: int) -> None:
+        """Take a matrix (count·d, variables) as it is."""
         self.matrix = sparse.csr_array(matrix)
         self.count = count
         self.width = self.matrix.shape[0] // count if count else 0

@@ -40,6 +40,7 @@ class Problem:
     """
 
     def __init__(self) -> None:
+        """Start empty."""
         self.variables = Layout()
         self.parameters = Layout()
         self.constraints = Layout()
@@ -49,7 +50,9 @@ class Problem:
         self.constraint_upper: Vector = np.empty(0)
         self._bound: list[_Bound] = []
 
-    def variable(self, name: str, shape: tuple[int, int], lower: ArrayLike = -np.inf, upper: ArrayLike = np.inf) -> Rows:
+    def variable(
+        self, name: str, shape: tuple[int, int], lower: ArrayLike = -np.inf, upper: ArrayLike = np.inf
+    ) -> Rows:
         """A decision variable (K, d) with box bounds, broadcast to its shape."""
         indices = self.variables.add(name, shape)
         self.lower = np.append(self.lower, np.broadcast_to(np.asarray(lower, float), shape).reshape(-1))
@@ -135,7 +138,7 @@ class Problem:
             (ca.mtimes(MX(to_dm(b.selector.T)), ca.vec(v[1])) for b, v in zip(self._bound, gradients, strict=True)),
             MX.zeros(x.numel(), 1),
         )
-        terms = self._term_values(values, p)
+        terms = self._term_values([v[0] for v in values], p)
         return {
             "nlp": Function("nlp", [x, p], [f, g], ["x", "p"], ["f", "g"]),
             "grad_f": Function("nlp_grad_f", [x, p], [f, gradient], ["x", "p"], ["f", "grad_f_x"]),
@@ -157,10 +160,10 @@ class Problem:
         weights = ca.repmat(p[bound.weights.tolist()], 1, bound.count) if bound.terms else MX.zeros(0, bound.count)
         return local, parameters, weights
 
-    def _term_values(self, values: list[tuple[MX, MX]], p: MX) -> MX:
+    def _term_values(self, values: list[MX], p: MX) -> MX:
         """Weighted total of each term, in the order of ``terms``."""
         totals = dict.fromkeys(self.terms, MX(0))
-        for bound, (terms, _) in zip(self._bound, values, strict=True):
+        for bound, terms in zip(self._bound, values, strict=True):
             sums = ca.sum2(terms)
             for i, name in enumerate(bound.terms):
                 totals[name] = totals[name] + p[int(bound.weights[i])] * sums[i]

@@ -32,7 +32,9 @@ class Options:
 
     def ipopt(self) -> dict[str, Any]:
         """The options as IPOPT names them."""
-        named = {name: getattr(self, name) for name in ("max_iter", "tol", "acceptable_tol", "constr_viol_tol", "mu_init")}
+        named = {
+            name: getattr(self, name) for name in ("max_iter", "tol", "acceptable_tol", "constr_viol_tol", "mu_init")
+        }
         return {"print_level": 0, "sb": "yes", **named, **dict(self.extra)}
 
 
@@ -65,6 +67,7 @@ class Solver:
     """A problem with its functions built, ready to be solved from any start with any parameters."""
 
     def __init__(self, problem: Problem) -> None:
+        """Build the problem's functions; nothing may be added to it afterwards."""
         self.problem = problem
         self.functions = problem.functions()
         self._solvers: dict[Options, ca.Function] = {}
@@ -72,7 +75,7 @@ class Solver:
     def _solver(self, options: Options) -> ca.Function:
         if options not in self._solvers:
             f = self.functions
-            settings = {
+            settings: dict[str, Any] = {
                 "ipopt": options.ipopt(),
                 "print_time": False,
                 "error_on_fail": False,

@@ -32,7 +32,9 @@ def _stage(target: Target, contacts: tuple[int, ...], joints: tuple[int, ...]) -
     return _stages[key]
 
 
-def design_finger(target: Target, contact: int, joints: int, stream: tuple[int, ...], weights: Mapping[str, Any]) -> Synthesised:
+def design_finger(
+    target: Target, contact: int, joints: int, stream: tuple[int, ...], weights: Mapping[str, Any]
+) -> Synthesised:
     """One trial of Algorithm 1: a finger alone, from the random start that ``stream`` names."""
     seed = random_finger(target, contact, joints, np.random.default_rng(stream))
     return _stage(target, (contact,), (joints,)).solve((seed,), weights)

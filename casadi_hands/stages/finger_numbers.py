@@ -24,7 +24,9 @@ def contact_kinematics(finger: FingerSeed, strings: NDArray[np.int64], link_radi
     function = finger_kinematics(finger.joints)
     points, jacobians = [], []
     for angles, string in zip(finger.angles, strings, strict=True):
-        on_link, _ = tip_point(ca.DM(finger.tips[string]), finger.lengths[-1], link_radius)
+        # The same code serves CasADi's numbers; only its annotations speak of symbols.
+        tip, length, radius = ca.DM(finger.tips[string]), ca.DM(finger.lengths[-1]), ca.DM(link_radius)
+        on_link, _ = tip_point(tip, length, radius)  # type: ignore[arg-type]
         base = np.append(finger.base, 0)
         *_, point, jacobian = function(base, finger.axis_vectors.T, finger.lengths, angles, on_link)
         points.append(np.asarray(point).reshape(-1))

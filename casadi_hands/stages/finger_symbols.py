@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -54,7 +55,7 @@ class PlacedFinger:
     def ends(self) -> list[tuple[SX, SX]]:
         """Both ends (3,) of each link's axis."""
         points = [self.origins[:, j] for j in range(self.origins.shape[1])] + [self.tip]
-        return list(zip(points[:-1], points[1:], strict=True))
+        return list(itertools.pairwise(points))
 
     @property
     def tip_rotation(self) -> SX:

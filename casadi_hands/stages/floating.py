@@ -59,6 +59,7 @@ class FloatingStage:
     """The stage's problem, built once for a task's structure."""
 
     def __init__(self, model: Model) -> None:
+        """Build the problem of a model's structure."""
         self.model = model
         problem = Problem()
         side = declare_object(problem, model)
@@ -129,6 +130,5 @@ class FloatingStage:
         return candidates
 
     def _with_flags(self, flags: Array, start: Solution, parameters: Mapping[str, Array | float]) -> Solution:
-        return self.solver.solve(
-            {**start.values, "activity": flags}, parameters, OPTIONS, lower={"activity": flags}, upper={"activity": flags}
-        )
+        fixed = {"activity": flags}
+        return self.solver.solve({**start.values, **fixed}, parameters, OPTIONS, lower=fixed, upper=fixed)

@@ -29,9 +29,8 @@ def touch(joints: int, moves: bool) -> Kernel:
     angles, angles_before = kernel.variable("angles", joints), kernel.variable("angles_before", joints)
     palm, palm_before = Palm(kernel, moves), Palm(kernel, moves, "_before")
     symbols = given_morphology(kernel, joints)
-    reference, radius, friction, sharpness, step = (
-        kernel.parameter(n, k) for n, k in (("reference", 4), ("radius", 1), ("friction", 1), ("sharpness", 1), ("step", 1))
-    )
+    reference = kernel.parameter("reference", 4)
+    radius, friction, sharpness, step = (kernel.parameter(n) for n in ("radius", "friction", "sharpness", "step"))
     position, quaternion = placed(pose, reference)
     rotation = rotation_matrix(quaternion)
     in_palm = palm.sees(position + ca.mtimes(rotation, point))
@@ -59,8 +58,8 @@ def move(joints: int) -> Kernel:
     angles = [kernel.variable(f"angles{i}", joints) for i in range(3)]
     symbols = given_morphology(kernel, joints)
     lowest, highest, step = kernel.parameter("lowest"), kernel.parameter("highest"), kernel.parameter("step")
-    tips = [symbols.placed(a).tip for a in angles]
-    kernel.cost("finger_acceleration", finger.tip_acceleration(*tips, step))
+    before, now, after = (symbols.placed(a).tip for a in angles)
+    kernel.cost("finger_acceleration", finger.tip_acceleration(before, now, after, step))
     kernel.cost("joint_limits", ca.vertcat(ca.fmax(angles[1] - highest, 0), ca.fmax(lowest - angles[1], 0)))
     return kernel
 
@@ -71,8 +70,10 @@ def object_clearance(joints: int, primitives: int, moves: bool) -> Kernel:
     pose, angles = kernel.variable("pose", 6), kernel.variable("angles", joints)
     palm = Palm(kernel, moves)
     symbols = given_morphology(kernel, joints)
-    reference, radius, palm_radius = kernel.parameter("reference", 4), kernel.parameter("radius"), kernel.parameter("palm_radius")
-    ground, margin = kernel.parameter("ground"), kernel.parameter("margin")
+    reference = kernel.parameter("reference", 4)
+    radius, palm_radius, ground, margin = (
+        kernel.parameter(name) for name in ("radius", "palm_radius", "ground", "margin")
+    )
     shapes = ca.reshape(kernel.parameter("primitives", 7 * primitives), 7, primitives)
     position, quaternion = placed(pose, reference)
     rotation = rotation_matrix(quaternion)
@@ -91,9 +92,7 @@ def object_clearance(joints: int, primitives: int, moves: bool) -> Kernel:
     return kernel
 
 
-def distances(
-    here: PlacedFinger, radius: SX, palm_radius: SX, primitives: SX, up: SX, ground: SX
-) -> tuple[SX, SX]:
+def distances(here: PlacedFinger, radius: SX, palm_radius: SX, primitives: SX, up: SX, ground: SX) -> tuple[SX, SX]:
     """Distances between one finger and all but other fingers: those to keep apart, and the touching link's (K,)."""
     ends = here.ends
     apart = [
@@ -124,4 +123,3 @@ def palm_motion() -> Kernel:
     step = kernel.parameter("step")
     kernel.cost("base_acceleration", ca.vertcat((after - 2 * now + before) / step**2, 0.1 * now))
     return kernel
-

@@ -19,15 +19,16 @@ def placed(pose: SX, reference: SX) -> tuple[SX, SX]:
 
 
 class Palm:
-    """The palm's pose at one time: given, plus an offset where the task lets it move.
-
-    Args:
-        kernel: where the symbols are declared.
-        moves: whether the palm's offset (6,) - a translation and a rotation vector, world - is a variable.
-        tag: appended to the names.
-    """
+    """The palm's pose at one time: given, plus an offset where the task lets it move."""
 
     def __init__(self, kernel: Kernel, moves: bool, tag: str = "") -> None:
+        """Declare the pose's symbols in a kernel.
+
+        Args:
+            kernel: where the symbols are declared.
+            moves: whether the palm's offset (6,) - a translation and a rotation vector, world - is a variable.
+            tag: appended to the names.
+        """
         offset = kernel.variable(f"palm{tag}", 6) if moves else SX.zeros(6, 1)
         self.position = kernel.parameter(f"palm_position{tag}", 3) + offset[:3]
         given = kernel.parameter(f"palm_quaternion{tag}", 4)
@@ -58,10 +59,10 @@ def dynamics(contacts: int, suffix: str = "", regularise: bool = True) -> Kernel
     reference, step = kernel.parameter("reference", 4), kernel.parameter("step")
     gravity, external, external_torque = (kernel.parameter(n, 3) for n in ("gravity", "external", "external_torque"))
     inertia, inertial = ca.reshape(kernel.parameter("inertia", 9), 3, 3), kernel.parameter("inertial")
-    positions, quaternions = zip(*[placed(pose, reference) for pose in poses], strict=True)
-    acceleration = (positions[2] - 2 * positions[1] + positions[0]) / step**2
-    omega, alpha = angular_motion(*quaternions, step)
-    rotation = rotation_matrix(quaternions[1])
+    before, now, after = (placed(pose, reference) for pose in poses)
+    acceleration = (after[0] - 2 * now[0] + before[0]) / step**2
+    omega, alpha = angular_motion(before[1], now[1], after[1], step)
+    rotation = rotation_matrix(now[1])
     inertial_torque = inertial * body.gyroscopic(inertia, omega, alpha)
     kernel.cost(
         "linear_momentum" + suffix,
@@ -113,7 +114,8 @@ def ground_contact(suffix: str = "") -> Kernel:
     kernel = Kernel("ground" + suffix)
     pose, pose_before = kernel.variable("pose", 6), kernel.variable("pose_before", 6)
     point, force, activity = kernel.variable("point", 3), kernel.variable("force", 3), kernel.variable("activity", 1)
-    reference, capsule, height = kernel.parameter("reference", 4), kernel.parameter("capsule", 7), kernel.parameter("height")
+    reference, capsule = kernel.parameter("reference", 4), kernel.parameter("capsule", 7)
+    height = kernel.parameter("height")
     friction, sharpness, step = (kernel.parameter(n) for n in ("friction", "sharpness", "step"))
     position, quaternion = placed(pose, reference)
     rotation = rotation_matrix(quaternion)
@@ -139,7 +141,8 @@ def goal_pose() -> Kernel:
     """The task term at one goal (eq. 2.9)."""
     kernel = Kernel("goal")
     pose = kernel.variable("pose", 6)
-    reference, target, vector = kernel.parameter("reference", 4), kernel.parameter("target", 3), kernel.parameter("vector", 3)
+    reference = kernel.parameter("reference", 4)
+    target, vector = kernel.parameter("target", 3), kernel.parameter("vector", 3)
     position, turned = placed(pose, reference)
     kernel.cost("task", body.task_pose(position, turned, target, multiply(exponential(vector), reference)), "sum")
     return kernel
@@ -149,7 +152,8 @@ def goal_point() -> Kernel:
     """The task term of a drawing at one sample of its path (fig. 3.4)."""
     kernel = Kernel("goal")
     pose = kernel.variable("pose", 6)
-    reference, target, tool = kernel.parameter("reference", 4), kernel.parameter("target", 3), kernel.parameter("tool", 3)
+    reference = kernel.parameter("reference", 4)
+    target, tool = kernel.parameter("target", 3), kernel.parameter("tool", 3)
     position, quaternion = placed(pose, reference)
     kernel.cost("task", body.task_point(position, rotation_matrix(quaternion), tool, target))
     return kernel

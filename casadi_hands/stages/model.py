@@ -44,7 +44,7 @@ class Units:
     @property
     def inertial(self) -> float:
         """Length over gravity, s²: what turns lengths/s² into m·g."""
-        return round_off(self.length / self.gravity)
+        return float(round_off(self.length / self.gravity))
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,8 @@ def build_model(task: Task) -> Model:
     if task.ground is not None:
         patch = np.asarray(task.ground.touches, float) / length
         capsule = _nearest_primitive(patch, primitives)
-        ground = Ground(round_off(task.ground.height / length), task.ground.friction, round_off(patch), round_off(capsule))
+        height = round_off(task.ground.height / length)
+        ground = Ground(height, task.ground.friction, round_off(patch), round_off(capsule))
     actuator = task.actuator
     low, high = task.hand.joint_limits
     return Model(

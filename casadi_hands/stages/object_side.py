@@ -118,7 +118,8 @@ def _bind_scenario(problem: Problem, model: Model, side: ObjectSide, force: Rows
         i, span = contacts - 1, (3 * contacts - 3, 3 * contacts)
         rows = [side.pose[1], side.pose[0], side.point[1].entries(*span), force.entries(*span)]
         rows.append(side.activity.entries(i, i + 1))
-        capsule, friction = (problem.parameter(f"ground_{n}{suffix}", (1, k)) for n, k in (("capsule", 7), ("friction", 1)))
+        capsule = problem.parameter(f"ground_capsule{suffix}", (1, 7))
+        friction = problem.parameter(f"ground_friction{suffix}", (1, 1))
         parameters = [p["reference"], capsule, p["ground_height"], friction, p["sharpness"], p["step"]]
         problem.bind(kernels.ground_contact(suffix), rows, parameters)
 

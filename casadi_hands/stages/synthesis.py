@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-from casadi import SX
 from numpy.typing import NDArray
 
 from casadi_hands.geometry import penalty_spline
@@ -56,7 +55,7 @@ class FingerSeed:
         """(n, 3) unit axes in parent frames."""
         angle = np.sqrt((self.axes**2).sum(axis=1) + 1e-10)
         local = np.column_stack([(np.sin(angle) / angle)[:, None] * self.axes, np.cos(angle)])
-        return np.einsum("nij,nj->ni", self.frames, local)
+        return np.asarray(np.einsum("nij,nj->ni", self.frames, local))
 
 
 @dataclass(frozen=True)
@@ -77,15 +76,16 @@ class Synthesised:
 
 
 class SynthesisStage:
-    """The problem of some fingers together; one finger alone is a hand of one.
-
-    Args:
-        target: what the fingers follow.
-        contacts: index of the contact of each finger.
-        joints: number of joints of each finger.
-    """
+    """The problem of some fingers together; one finger alone is a hand of one."""
 
     def __init__(self, target: Target, contacts: tuple[int, ...], joints: tuple[int, ...]) -> None:
+        """Build the problem.
+
+        Args:
+            target: what the fingers follow.
+            contacts: index of the contact of each finger.
+            joints: number of joints of each finger.
+        """
         self.target, self.contacts, self.joints = target, contacts, joints
         self.problem = problem = Problem()
         shortest, longest = target.link_length
@@ -99,7 +99,9 @@ class SynthesisStage:
                     "lengths": problem.variable(f"lengths{contact}", (1, n), shortest, longest),
                     "axes": problem.variable(f"axes{contact}", (1, 2 * n), -AXIS_RANGE, AXIS_RANGE),
                     "angles": problem.variable(f"angles{contact}", (count, n), *target.joint_limits),
-                    "tips": problem.variable(f"tips{contact}", (target.strings(contact), 2), -target.tip_arc, target.tip_arc),
+                    "tips": problem.variable(
+                        f"tips{contact}", (target.strings(contact), 2), -target.tip_arc, target.tip_arc
+                    ),
                 }
             )
         self._shared_parameters()
@@ -122,7 +124,8 @@ class SynthesisStage:
         problem, target, contact, n = self.problem, self.target, self.contacts[index], self.joints[index]
         p, count = problem.parameters, len(target.times)
         frames = problem.parameter(f"frames{contact}", (1, 9 * n))
-        wanted = [problem.parameter(f"{name}{contact}", (count, k)) for name, k in (("target", 3), ("force", 3), ("active", 1))]
+        wanted = [problem.parameter(f"{name}{contact}", (count, 3)) for name in ("target", "force")]
+        wanted.append(problem.parameter(f"active{contact}", (count, 1)))
         body = [rows["base"], rows["lengths"], rows["axes"]]
         at_keyframes = [row.constant(count) for row in body]
         tips = rows["tips"].take(target.string_of(contact))
@@ -145,7 +148,10 @@ class SynthesisStage:
         weights = linear(self.target.times, times)
         bound: list[Rows] = []
         for r in (rows, others):
-            bound += [*[r[name].constant(len(times)) for name in ("base", "lengths", "axes")], r["angles"].combine(weights)]
+            bound += [
+                *[r[name].constant(len(times)) for name in ("base", "lengths", "axes")],
+                r["angles"].combine(weights),
+            ]
         p = self.problem.parameters
         frames = [p[f"frames{self.contacts[k]}"] for k in (i, j)]
         self.problem.bind(_keep_apart(self.joints[i], self.joints[j]), bound, [*frames, p["link_radius"], p["margin"]])
@@ -160,12 +166,11 @@ class SynthesisStage:
         """
         values = self._values(seeds)
         parameters = self._parameters(seeds)
-        runs = []
+        runs: list[tuple[str, Solution]] = []
         for step in range(3):
             last = step == 2
-            solution = self.solver.solve(
-                values, parameters | self._weights(weights, step), options, *(() if last else self._loosened())
-            )
+            given = {**parameters, **self._weights(weights, step)}
+            solution = self.solver.solve(values, given, options, *(() if last else self._loosened()))
             values = solution.values
             runs.append((f"anneal {step}", solution))
         fingers = tuple(self._finger(solution, i, seed) for i, seed in enumerate(seeds))
@@ -207,7 +212,7 @@ class SynthesisStage:
             values[f"frames{contact}"] = seed.frames.transpose(0, 2, 1).reshape(1, -1)
             values[f"target{contact}"] = target.points[:, contact]
             values[f"force{contact}"] = target.forces[:, contact]
-            values[f"active{contact}"] = target.active[:, contact, None]
+            values[f"active{contact}"] = target.active[:, contact, None].astype(float)
             if f"idle_step{contact}" in self.problem.parameters:
                 idle = np.flatnonzero(~target.active[1:-1, contact]) + 1
                 values[f"idle_step{contact}"] = ((target.times[idle + 1] - target.times[idle - 1]) / 2)[:, None]
@@ -258,7 +263,9 @@ def _build(joints: int) -> Kernel:
     """One finger's shape: eq. 2.21, 2.22 and 2.25."""
     kernel = Kernel("build")
     base, lengths = kernel.variable("base", 2), kernel.variable("lengths", joints)
-    palm_radius, radius, shortest, longest = (kernel.parameter(n) for n in ("palm_radius", "radius", "shortest", "longest"))
+    palm_radius, radius, shortest, longest = (
+        kernel.parameter(n) for n in ("palm_radius", "radius", "shortest", "longest")
+    )
     kernel.cost("length", lengths)
     kernel.cost("minimum_length", finger.beyond_limits(lengths, shortest, longest), "sum")
     kernel.cost("finger_base", finger.off_palm(base, palm_radius - radius), "sum")
@@ -307,6 +314,7 @@ def _travel(joints: int) -> Kernel:
     kernel = Kernel("travel")
     frames = kernel.parameter("frames", 9 * joints)
     symbols = morphology(kernel.variable, frames, joints)
-    tips: list[SX] = [symbols.placed(kernel.variable(f"angles{i}", joints)).tip for i in range(3)]
-    kernel.cost("fingertip_acceleration", finger.tip_acceleration(*tips, kernel.parameter("step")))
+    before, now, after = (symbols.placed(kernel.variable(f"angles{i}", joints)).tip for i in range(3))
+    acceleration = finger.tip_acceleration(before, now, after, kernel.parameter("step"))
+    kernel.cost("fingertip_acceleration", acceleration)
     return kernel

@@ -29,9 +29,7 @@ class Target:
         needed: (N, 6) wrench about the object's centre that the fingers make together, palm axes.
         centers: (N, 3) the object's centre of mass.
         active: (N, C) bool.
-        friction: μ.
         pose: (N, 6) of the object in the world, as the floating stage has it.
-        palm_radius, link_radius, link_length, joint_limits: as ``Model``.
         model: the task.
     """
 
@@ -105,7 +103,7 @@ class Target:
 
 
 def string_of(active: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """For each keyframe (N,) of one contact the string of active keyframes it belongs to; idle ones count with the next."""
+    """For each keyframe (N,) of one contact its string of active keyframes; idle ones count with the next string."""
     starts = active & ~np.concatenate([[False], active[:-1]])
     strings = np.cumsum(starts) - 1
     return np.clip(np.where(active, strings, strings + 1), 0, max(int(starts.sum()) - 1, 0))

@@ -7,7 +7,8 @@ from casadi import SX
 
 from casadi_hands.geometry import norm, penalty_spline
 
-NULL_SPACE_DAMPING = 0.02  # of the Jacobian's singular values, lengths per rad: the lever below which a joint does not push
+# Of the Jacobian's singular values, lengths per rad: the lever below which a joint does not push.
+NULL_SPACE_DAMPING = 0.02
 _TORQUE_DAMPING = 1e-3  # λ of eq. A.5
 
 
