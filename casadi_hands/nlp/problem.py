@@ -44,6 +44,7 @@ class Problem:
         self.variables = Layout()
         self.parameters = Layout()
         self.constraints = Layout()
+        self.constraint_rows: dict[str, NDArray[np.int64]] = {}
         self.lower: Vector = np.empty(0)
         self.upper: Vector = np.empty(0)
         self.constraint_lower: Vector = np.empty(0)
@@ -111,11 +112,12 @@ class Problem:
         width = sum(sizes.values())
         if not width:
             return
-        self.constraints.add(kernel.name, (count, width))
+        rows = self.constraints.add(kernel.name, (count, width))
         lower, upper = np.empty((count, width)), np.empty((count, width))
         start = 0
         for name, size in sizes.items():
             lower[:, start : start + size], upper[:, start : start + size] = bounds[name]
+            self.constraint_rows[f"{kernel.name}.{name}"] = rows[:, start : start + size]
             start += size
         self.constraint_lower = np.append(self.constraint_lower, lower.reshape(-1))
         self.constraint_upper = np.append(self.constraint_upper, upper.reshape(-1))

@@ -47,6 +47,7 @@ class Solution:
         terms: cost term -> weighted value.
         objective: sum of the terms.
         violation: largest violation of a constraint.
+        violations: ``kernel.constraint`` -> its largest violation.
         status: IPOPT's own words; never taken as proof.
         iterations: number of iterations.
         seconds: wall time.
@@ -57,6 +58,7 @@ class Solution:
     terms: dict[str, float]
     objective: float
     violation: float
+    violations: dict[str, float]
     status: str
     iterations: int
     seconds: float
@@ -94,6 +96,7 @@ class Solver:
         options: Options | None = None,
         lower: Mapping[str, ArrayLike] | None = None,
         upper: Mapping[str, ArrayLike] | None = None,
+        constraints: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
         warm: Solution | None = None,
     ) -> Solution:
         """Solve from ``start``.
@@ -104,6 +107,7 @@ class Solver:
             options: IPOPT's settings.
             lower: variable -> lower bound, where it differs from the declared one.
             upper: variable -> upper bound, where it differs.
+            constraints: ``kernel.constraint`` -> bounds, where they differ from those given when it was bound.
             warm: an earlier solution whose multipliers are the start's.
 
         Raises:
@@ -119,13 +123,16 @@ class Solver:
         x0 = np.clip(problem.variables.pack(start, np.zeros(problem.variables.size)), lbx, ubx)
         p = problem.parameters.pack(parameters, np.zeros(problem.parameters.size))
         arguments: dict[str, Any] = {"x0": x0, "p": p, "lbx": lbx, "ubx": ubx}
-        arguments |= {"lbg": problem.constraint_lower, "ubg": problem.constraint_upper}
+        lbg, ubg = problem.constraint_lower.copy(), problem.constraint_upper.copy()
+        for name, (low, high) in (constraints or {}).items():
+            lbg[problem.constraint_rows[name]], ubg[problem.constraint_rows[name]] = low, high
+        arguments |= {"lbg": lbg, "ubg": ubg}
         if warm is not None and warm.multipliers:
             arguments |= {"lam_x0": warm.multipliers["x"], "lam_g0": warm.multipliers["g"]}
         started = time.perf_counter()
         answer = solver(**arguments)
         seconds = time.perf_counter() - started
-        return self._solution(answer, p, solver.stats(), seconds)
+        return self._solution(answer, p, (lbg, ubg), solver.stats(), seconds)
 
     def evaluate(self, values: Mapping[str, ArrayLike], parameters: Mapping[str, ArrayLike]) -> dict[str, float]:
         """The weighted value of every term at given variables."""
@@ -134,16 +141,19 @@ class Solver:
         terms = np.asarray(self.functions["terms"](x, p)).reshape(-1)
         return dict(zip(self.problem.terms, terms.tolist(), strict=True))
 
-    def _solution(self, answer: dict[str, Any], p: Vector, stats: dict[str, Any], seconds: float) -> Solution:
+    def _solution(
+        self, answer: dict[str, Any], p: Vector, bounds: tuple[Vector, Vector], stats: dict[str, Any], seconds: float
+    ) -> Solution:
         problem = self.problem
         x, g = (np.asarray(answer[name]).reshape(-1) for name in ("x", "g"))
-        beyond = np.maximum(problem.constraint_lower - g, g - problem.constraint_upper)
+        beyond = np.maximum(bounds[0] - g, g - bounds[1])
         terms = np.asarray(self.functions["terms"](x, p)).reshape(-1)
         return Solution(
             values=problem.variables.unpack(x),
             terms=dict(zip(problem.terms, terms.tolist(), strict=True)),
             objective=float(answer["f"]),
             violation=float(max(beyond.max(initial=0.0), 0.0)),
+            violations={name: float(max(beyond[rows].max(initial=0.0), 0.0)) for name, rows in problem.constraint_rows.items()},
             status=str(stats["return_status"]),
             iterations=int(stats["iter_count"]),
             seconds=seconds,

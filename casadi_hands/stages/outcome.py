@@ -1,0 +1,184 @@
+"""From nondimensional results back to SI: the hand and the motion that are written."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi as ca
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from casadi_hands.design import Finger, Hand, Link, Motion
+from casadi_hands.kinematics import finger_kinematics
+from casadi_hands.motion import catmull_rom
+from casadi_hands.stages.floating import Floating
+from casadi_hands.stages.grasp import inward_normals
+from casadi_hands.stages.model import Model, quaternion
+from casadi_hands.stages.synthesis import FingerSeed
+from casadi_hands.stages.target import on_capsules
+from casadi_hands.stages.whole_hand import WholeHand
+from casadi_hands.task import Task
+
+Array = NDArray[np.float64]
+_RESERVE = 1.5  # of torque and speed limits over what the motion uses, where the task names no actuator
+
+
+def hand_of(task: Task, model: Model, fingers: Sequence[FingerSeed], contacts: Sequence[int], effort: float, speed: float) -> Hand:
+    """The hand in SI; limits of the actuator if the task names one, else 1.5 times the motion's own torque and speed.
+
+    Args:
+        task: for what the stages do not know.
+        model: for the units.
+        fingers: morphology, nondimensional.
+        contacts: index of each finger's contact.
+        effort: largest joint torque of the motion, N·m.
+        speed: largest joint speed of the motion, rad/s.
+    """
+    length = model.units.length
+    built = []
+    for finger, contact in zip(fingers, contacts, strict=True):
+        links = tuple(
+            Link(float(l * length), model.link_radius * length, tuple(map(float, a / np.linalg.norm(a))))
+            for l, a in zip(finger.lengths, finger.axis_vectors, strict=True)
+        )
+        base = (float(finger.base[0] * length), float(finger.base[1] * length), 0.0)
+        built.append(Finger(model.contact_names[contact], base, links))
+    actuator = task.actuator
+    return Hand(
+        palm_radius=task.palm.radius,
+        palm_thickness=task.palm.thickness,
+        fingers=tuple(built),
+        joint_lower=model.joint_limits[0],
+        joint_upper=model.joint_limits[1],
+        effort=_RESERVE * effort if actuator is None else actuator.torque,
+        velocity=_RESERVE * speed if actuator is None else actuator.speed,
+        density=task.hand.density,
+    )
+
+
+def floating_motion(model: Model, floating: Floating) -> Motion:
+    """The object's motion of stage 1, with no joints and every contact's link named ``none``."""
+    schedule = model.schedule
+    spline = catmull_rom(schedule.keyframes, schedule.samples)
+    pose = spline @ floating.pose
+    count, contacts = floating.force.shape[:2]
+    point = (spline @ floating.point.reshape(len(floating.point), -1)).reshape(count, contacts, 3)
+    active = floating.active[schedule.sample_keyframes]
+    names = model.contact_names + (("ground",) if model.ground is not None else ())
+    links = ["none"] * model.contacts + (["ground"] if model.ground is not None else [])
+    return _motion(
+        model, pose[:, :3], pose[:, 3:], model.palm_position, model.palm_quaternion, np.zeros((count, 0)), (), names, links,
+        active, floating.force * active[:, :, None], point, np.zeros_like(point),
+    )  # fmt: skip
+
+
+def whole_hand_motion(model: Model, result: WholeHand) -> Motion:
+    """The motion of stage 3; each contact's point on the link is the point of its surface nearest the object's."""
+    count, contacts = result.force.shape[:2]
+    names = model.contact_names + (("ground",) if model.ground is not None else ())
+    capsules = model.capsules if model.ground is None else np.vstack([model.capsules, model.ground.capsule])
+    point = np.array([on_capsules(p, capsules, inward_normals(p, capsules)) for p in result.point])
+    on_link = np.zeros_like(point)
+    links = ["none"] * model.contacts + (["ground"] if model.ground is not None else [])
+    for i, (finger, contact) in enumerate(zip(result.fingers, result.contacts, strict=True)):
+        links[contact] = f"finger{i}_link{finger.joints - 1}"
+        function = finger_kinematics(finger.joints)
+        tip = np.array([[*np.zeros(3), 0, 0, finger.lengths[-1], model.link_radius]])
+        for s in range(count):
+            in_palm = _in_palm(model, result, s, point[s, contact])
+            base = np.append(finger.base, 0)
+            origins, rotations, *_ = function(base, finger.axis_vectors.T, finger.lengths, result.angles[i][s], ca.DM.zeros(3))
+            local = np.asarray(rotations)[:, -3:].T @ (in_palm - np.asarray(origins)[:, -1])
+            on_link[s, contact] = on_capsules(local[None], tip, inward_normals(local[None], tip))[0]
+    if model.ground is not None:
+        on_link[:, -1] = _in_world(model, result, point[:, -1])
+        on_link[:, -1, 2] = model.ground.height
+    angles = np.hstack(result.angles) if result.angles else np.zeros((count, 0))
+    joint_names = tuple(f"finger{i}_joint{j}" for i, f in enumerate(result.fingers) for j in range(f.joints))
+    return _motion(
+        model, result.position, result.vector, result.palm_position, result.palm_quaternion, angles, joint_names,
+        names, links, result.active, result.force, point, on_link,
+    )  # fmt: skip
+
+
+def _rotation(model: Model, vector: Array) -> Array:
+    return np.asarray(pin.exp3(vector) @ pin.Quaternion(*model.reference).matrix())
+
+
+def _in_world(model: Model, result: WholeHand, points: Array) -> Array:
+    """Object points (S, 3) in the world."""
+    turns = np.array([_rotation(model, v) for v in result.vector])
+    return np.asarray(np.einsum("sij,sj->si", turns, points) + result.position)
+
+
+def _in_palm(model: Model, result: WholeHand, sample: int, point: Array) -> Array:
+    """An object point (3,) in the palm frame at a sample."""
+    world = _rotation(model, result.vector[sample]) @ point + result.position[sample]
+    palm = pin.Quaternion(*result.palm_quaternion[sample]).matrix()
+    return np.asarray(palm.T @ (world - result.palm_position[sample]))
+
+
+def _motion(
+    model: Model,
+    position: Array,
+    vector: Array,
+    palm_position: Array,
+    palm_quaternion: Array,
+    angles: Array,
+    joint_names: tuple[str, ...],
+    contact_names: tuple[str, ...],
+    contact_link: Sequence[str],
+    active: NDArray[np.bool_],
+    force: Array,
+    point: Array,
+    on_link: Array,
+) -> Motion:
+    """Dress nondimensional arrays as a ``Motion`` in SI, forces turned into the world."""
+    units = model.units
+    rotations = np.array([_rotation(model, v) for v in vector])
+    scale = np.full(len(contact_names), units.length)
+    return Motion(
+        time=model.schedule.samples,
+        object_position=position * units.length,
+        object_orientation=_continuous(np.array([quaternion(r) for r in rotations])),
+        base_position=palm_position * units.length,
+        base_orientation=_continuous(palm_quaternion),
+        joint_angles=angles,
+        joint_names=joint_names,
+        contact_names=contact_names,
+        contact_link=tuple(contact_link),
+        contact_active=active,
+        contact_force=np.einsum("sij,scj->sci", rotations, force) * units.force,
+        contact_point_object=point * units.length,
+        contact_point_link=on_link * scale[None, :, None],
+        external_force=np.zeros_like(position),
+        external_torque=np.zeros_like(position),
+    )
+
+
+def _continuous(quaternions: Array) -> Array:
+    """The same orientations (S, 4) with signs chosen so that neighbours are near."""
+    signs = np.cumprod(np.where((quaternions[1:] * quaternions[:-1]).sum(axis=1) < 0, -1.0, 1.0))
+    return np.vstack([quaternions[:1], quaternions[1:] * signs[:, None]])
+
+
+def joint_loads(model: Model, result: WholeHand) -> tuple[float, float]:
+    """Largest joint torque (N·m, from contact forces) and speed (rad/s) of a motion."""
+    torque, speed = 0.0, 0.0
+    for i, (finger, contact) in enumerate(zip(result.fingers, result.contacts, strict=True)):
+        function = finger_kinematics(finger.joints)
+        times = model.schedule.samples
+        speed = max(speed, float(np.abs(np.diff(result.angles[i], axis=0) / np.diff(times)[:, None]).max()))
+        for s in range(len(times)):
+            palm = pin.Quaternion(*result.palm_quaternion[s]).matrix()
+            force = palm.T @ _rotation(model, result.vector[s]) @ result.force[s, contact]
+            base = np.append(finger.base, 0)
+            axes, lengths, angles = finger.axis_vectors.T, finger.lengths, result.angles[i][s]
+            origins, rotations, *_ = function(base, axes, lengths, angles, ca.DM.zeros(3))
+            local = np.asarray(rotations)[:, -3:].T @ (
+                _in_palm(model, result, s, result.point[s, contact]) - np.asarray(origins)[:, -1]
+            )
+            jacobian = np.asarray(function(base, axes, lengths, angles, local)[4])
+            torque = max(torque, float(np.abs(jacobian.T @ force).max()))
+    return torque * model.units.torque, speed

@@ -1,0 +1,342 @@
+"""Stage 4: the same motion as a hard-constrained problem at dense knots, the morphology free (method beyond the thesis).
+
+Newton–Euler by shooting, contact on both surfaces with opposed normals, rolling without slip, friction cones with a
+margin, a floor on normal forces, forces that joints supply with a lever, clearance: all constraints. Reached by
+continuation: soft rolling and soft supply first, then rolling hard, then both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from casadi_hands.nlp import Options, Problem, Rows, Solution, Solver
+from casadi_hands.stages import exact_kernels as kernels
+from casadi_hands.stages.model import Model
+from casadi_hands.stages.object_side import GOAL_TOLERANCE, MOST_FORCE, MOST_TURN, NO_GROUND
+from casadi_hands.stages.synthesis import AXIS_RANGE, FingerSeed
+from casadi_hands.stages.whole_hand import WholeHand
+
+Array = NDArray[np.float64]
+_EXACT = (("nlp_scaling_method", "none"), ("bound_push", 1e-4), ("bound_frac", 1e-4))
+SOFT = Options(max_iter=120, tol=1e-3, acceptable_tol=1e-2, constr_viol_tol=1e-6, mu_init=1e-2, extra=_EXACT)
+HARD = Options(max_iter=150, tol=1e-6, acceptable_tol=1e-5, constr_viol_tol=1e-10, mu_init=1e-3, extra=_EXACT)
+CLEARANCE = 0.02  # half extents, asked of bodies that do not touch
+ACCEPTED = 1e-7  # largest violation with which a refined motion is handed on
+_FREE = (-np.inf, np.inf)
+
+
+@dataclass(frozen=True)
+class Margin:
+    """How far inside its limits a motion must stay; exact motions can still balance on a fingertip.
+
+    Attributes:
+        friction: share of μ that may be used.
+        normal_force: least normal force of an active contact, m·g.
+        passive: largest component of a force that no joint supplies, m·g.
+    """
+
+    friction: float = 0.7
+    normal_force: float = 0.25
+    passive: float = 0.009
+
+
+WEIGHTS = {
+    "slip": 3.0,
+    "passive_force": 3.0,
+    "spin": 0.03,
+    "stay_point": 1.0,
+    "stay_force": 0.02,
+    "friction_margin": 0.02,
+    "force_change": 0.5,
+    "joint_acceleration": 3e-4,
+    "stay_design": 0.02,
+    "stay_path": 1.0,
+}
+
+
+@dataclass(frozen=True)
+class Refined:
+    """A motion that meets its constraints, or how far it got.
+
+    Attributes:
+        hand: as the whole-hand stage's, with the design as it is now.
+        exact: whether every constraint is met within ``ACCEPTED``.
+        rolls: whether rolling was a constraint in the end.
+        worst: (constraint, violation) of the last solve.
+        moved: for each contact how far base and lengths moved, half extents, and axes turned, rad.
+        runs: every solve: (what, solution).
+    """
+
+    hand: WholeHand
+    exact: bool
+    rolls: bool
+    worst: tuple[str, float]
+    moved: dict[str, dict[str, float]]
+    runs: tuple[tuple[str, Solution], ...]
+
+
+class RefineStage:
+    """The stage's problem for one structure: joints of each finger and when each contact touches."""
+
+    def __init__(self, model: Model, contacts: tuple[int, ...], joints: tuple[int, ...], active: NDArray[np.bool_]) -> None:
+        self.model, self.contacts, self.joints = model, contacts, joints
+        self.active = active[:, list(contacts)]
+        self.touching = self.active | np.vstack([np.zeros((1, len(contacts)), bool), self.active[:-1]])
+        self.problem = problem = Problem()
+        count = len(model.schedule.samples)
+        self._declare(count)
+        p = problem.parameters
+        self._common()
+        now, later = np.arange(count - 1), np.arange(1, count)
+        states = [r.take(k) for k in (now, later) for r in (self.pose, self.rate)]
+        pairs = [r.take(k) for r in (self.point, self.force) for k in (now, later)]
+        common = [p["reference"], p["step"], p["gravity"], p["inertial"], p["inertia"]]
+        problem.bind(kernels.physics(len(contacts)), [*states, *pairs], common, {"defect": (0, 0)})
+        problem.bind(kernels.force_change(len(contacts)), [self.force.take(now), self.force.take(later)])
+        wanted = problem.parameter("wanted_pose", (count, 6))
+        problem.bind(kernels.stay_on_path(), [self.pose], [wanted])
+        for i in range(len(contacts)):
+            self._bind_finger(i, count)
+            for j in range(i):
+                self._bind_pair(i, j, count)
+        self.solver = Solver(problem)
+
+    def _declare(self, count: int) -> None:
+        problem, model = self.problem, self.model
+        self.pose = problem.variable("pose", (count, 6))
+        self.rate = problem.variable("rate", (count, 6))
+        self.point = problem.variable("point", (count, 3 * len(self.contacts)))
+        self.force = problem.variable("force", (count, 3 * len(self.contacts)), -MOST_FORCE, MOST_FORCE)
+        shortest, longest = model.link_length
+        reach = model.palm_radius
+        self.angles, self.shape = [], []
+        for c, n in zip(self.contacts, self.joints, strict=True):
+            self.angles.append(problem.variable(f"angles{c}", (count, n), *model.joint_limits))
+            self.shape.append(
+                [
+                    problem.variable(f"base{c}", (1, 2), -reach, reach),
+                    problem.variable(f"lengths{c}", (1, n), shortest, longest),
+                    problem.variable(f"axes{c}", (1, 2 * n), -AXIS_RANGE, AXIS_RANGE),
+                ]
+            )
+
+    def _common(self) -> None:
+        problem, model = self.problem, self.model
+        count = len(model.schedule.samples)
+        widths = {"reference": 4, "gravity": 3, "inertial": 1, "inertia": 9, "radius": 1, "palm_radius": 1}
+        widths |= {"ground_height": 1, "friction": 1, "primitives": 7 * len(model.primitives)}
+        for name, width in widths.items():
+            problem.parameter(name, (1, width))
+        problem.parameter("step", (count - 1, 1))
+        problem.parameter("palm_position", (count, 3))
+        problem.parameter("palm_quaternion", (count, 4))
+        for c in self.contacts:
+            problem.parameter(f"capsule{c}", (1, 7))
+            problem.parameter(f"helper{c}", (count, 3))
+            problem.parameter(f"wanted_point{c}", (count, 3))
+            problem.parameter(f"wanted_force{c}", (count, 3))
+
+    def _scene(self, contact: int, knots: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+        p = self.problem.parameters
+        places = [p["palm_position"][knots], p["palm_quaternion"][knots]]
+        return [p["reference"], *places, p[f"capsule{contact}"], p["radius"]]
+
+    def _bind_finger(self, i: int, count: int) -> None:
+        problem, model, c, n = self.problem, self.model, self.contacts[i], self.joints[i]
+        p = problem.parameters
+        frames = problem.parameter(f"frames{c}", (1, 9 * n))
+        shape, angles = self.shape[i], self.angles[i]
+        point, force = self.point.entries(3 * i, 3 * i + 3), self.force.entries(3 * i, 3 * i + 3)
+        touching = np.flatnonzero(self.touching[:, i])
+        rows = [*[r.constant(len(touching)) for r in shape], *[r.take(touching) for r in (self.pose, point, force, angles)]]
+        own = [p[f"{name}{c}"][touching] for name in ("helper", "wanted_point", "wanted_force")]
+        torque = model.torque_limit
+        bounds = {
+            "on_surfaces": (0, 0),
+            "opposed": (0, 0),
+            "facing": (-np.inf, -0.5),
+            "pressing": (0, np.inf),
+            "cone": (0, np.inf),
+            "passive": _FREE,
+            "torque": (-torque, torque),
+        }
+        parameters = [frames, *self._scene(c, touching), own[0], p["friction"], *own[1:]]
+        problem.bind(kernels.contact(n, c), rows, parameters, bounds)
+        start = np.flatnonzero(self.active[:-1, i])
+        rows = [r.constant(len(start)) for r in shape]
+        for knots in (start, start + 1):
+            rows += [r.take(knots) for r in (self.pose, point, angles)]
+        parameters = [frames, *self._scene(c, start), *self._scene(c, start + 1), p[f"helper{c}"][start], p["step"][start]]
+        problem.bind(kernels.rolling(n, c), rows, parameters, {"no_slip": _FREE})
+        self._bind_clearance(i, frames)
+        middle = np.arange(1, count - 1)
+        three = [angles.take(middle + offset) for offset in (-1, 0, 1)]
+        speed = model.speed_limit
+        problem.bind(kernels.joint_motion(n, c), three, [p["step"][middle]], {"speed": (-speed, speed)})
+        own = [problem.parameter(f"wanted_{name}{c}", (1, k)) for name, k in (("base", 2), ("lengths", n), ("axes", 2 * n))]
+        reach = (model.palm_radius - model.link_radius) ** 2
+        problem.bind(kernels.stay(n, c), shape, own, {"on_palm": (0, reach)})
+
+    def _bind_clearance(self, i: int, frames: NDArray[np.int64]) -> None:
+        problem, model, c, n = self.problem, self.model, self.contacts[i], self.joints[i]
+        p = problem.parameters
+        primitives = len(model.primitives)
+        touched = int(np.argmin(np.abs(model.primitives - model.capsules[c]).sum(axis=1)))
+        for knots, skipped in ((np.flatnonzero(self.touching[:, i]), touched), (np.flatnonzero(~self.touching[:, i]), None)):
+            if not len(knots):
+                continue
+            kernel = kernels.apart(n, primitives, c, skipped)
+            rows = [*[r.constant(len(knots)) for r in self.shape[i]], self.pose.take(knots), self.angles[i].take(knots)]
+            places = [p["palm_position"][knots], p["palm_quaternion"][knots]]
+            scene = [p[name] for name in ("radius", "palm_radius", "ground_height", "primitives")]
+            problem.bind(kernel, rows, [frames, p["reference"], *places, *scene], {"clear": (CLEARANCE, np.inf)})
+
+    def _bind_pair(self, i: int, j: int, count: int) -> None:
+        p, c, d = self.problem.parameters, self.contacts[i], self.contacts[j]
+        rows: list[Rows] = []
+        for k in (i, j):
+            rows += [*[r.constant(count) for r in self.shape[k]], self.angles[k]]
+        kernel = kernels.fingers_apart(self.joints[i], self.joints[j], f"{c}_{d}")
+        parameters = [p[f"frames{c}"], p[f"frames{d}"], p["radius"]]
+        self.problem.bind(kernel, rows, parameters, {"clear": (CLEARANCE, np.inf)})
+
+    def solve(self, start: WholeHand, margin: Margin | None = None) -> Refined:
+        """Refine a whole-hand motion: soft, then rolling hard, then rolling and supply hard."""
+        margin = margin or Margin()
+        values, parameters = self._start(start), self._parameters(start, margin)
+        lower, upper = self._bounds()
+        pressing = {}
+        for i, c in enumerate(self.contacts):
+            knots = np.flatnonzero(self.touching[:, i])
+            floor = np.where(self.active[knots, i], margin.normal_force, 0.0)[:, None]
+            pressing[f"contact{c}.pressing"] = (floor, np.inf)
+        roll = {f"rolling{c}.no_slip": (0.0, 0.0) for c in self.contacts}
+        supply = {f"contact{c}.passive": (-margin.passive, margin.passive) for c in self.contacts}
+        runs: list[tuple[str, Solution]] = []
+        for what, hard, options in (("soft", {}, SOFT), ("rolling", roll, SOFT), ("exact", roll | supply, HARD)):
+            solution = self.solver.solve(values, parameters, options, lower, upper, pressing | hard)
+            runs.append((what, solution))
+            values = solution.values
+        return self._result(start, runs)
+
+    def _bounds(self) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Goals as bounds, rest at both ends, no force where there is no contact."""
+        model, schedule = self.model, self.model.schedule
+        count = len(schedule.samples)
+        pose = np.tile([np.inf] * 3 + [MOST_TURN] * 3, (count, 1))
+        low_pose, high_pose = -pose, pose
+        if model.tool is None:
+            goals, at = np.hstack([model.goal_positions, model.goal_vectors]), schedule.keyframe_samples[list(schedule.goals)]
+            low_pose[at], high_pose[at] = goals - GOAL_TOLERANCE, goals + GOAL_TOLERANCE
+        rate = np.full((count, 6), np.inf)
+        rate[[0, -1]] = 0.0
+        force = np.repeat(np.where(self.active, MOST_FORCE, 0.0), 3, axis=1)
+        return {"pose": low_pose, "rate": -rate, "force": -force}, {"pose": high_pose, "rate": rate, "force": force}
+
+    def _start(self, start: WholeHand) -> dict[str, Array]:
+        samples = self.model.schedule.samples
+        chosen = list(self.contacts)
+        values = {
+            "pose": np.hstack([start.position, start.vector]),
+            "rate": np.hstack([np.gradient(start.position, samples, axis=0), self._spins(start)]),
+            "point": start.point[:, chosen].reshape(len(samples), -1),
+            "force": start.force[:, chosen].reshape(len(samples), -1),
+        }
+        for c, finger, angles in zip(self.contacts, start.fingers, start.angles, strict=True):
+            values |= {f"angles{c}": angles, f"base{c}": finger.base, f"lengths{c}": finger.lengths}
+            values[f"axes{c}"] = finger.axes.reshape(1, -1)
+        return values
+
+    def _spins(self, start: WholeHand) -> Array:
+        """Angular velocities (S, 3), object frame, by central differences."""
+        samples = self.model.schedule.samples
+        reference = pin.Quaternion(*self.model.reference).matrix()
+        turns = [pin.exp3(v) @ reference for v in start.vector]
+        spins = np.zeros((len(samples), 3))
+        for k in range(1, len(samples) - 1):
+            spins[k] = pin.log3(turns[k - 1].T @ turns[k + 1]) / (samples[k + 1] - samples[k - 1])
+        return spins
+
+    def _parameters(self, start: WholeHand, margin: Margin) -> dict[str, Array | float]:
+        model = self.model
+        count = len(model.schedule.samples)
+        values: dict[str, Array | float] = {
+            "reference": model.reference,
+            "gravity": model.gravity,
+            "inertial": model.units.inertial,
+            "inertia": model.inertia.reshape(1, 9),
+            "radius": model.link_radius,
+            "palm_radius": model.palm_radius,
+            "ground_height": NO_GROUND if model.ground is None else model.ground.height,
+            "friction": margin.friction * model.friction,
+            "primitives": model.primitives.reshape(1, -1),
+            "step": np.diff(model.schedule.samples)[:, None],
+            "palm_position": start.palm_position,
+            "palm_quaternion": start.palm_quaternion,
+            "wanted_pose": np.hstack([start.position, start.vector]),
+        }
+        for c, finger in zip(self.contacts, start.fingers, strict=True):
+            values[f"frames{c}"] = finger.frames.transpose(0, 2, 1).reshape(1, -1)
+            values[f"wanted_base{c}"], values[f"wanted_lengths{c}"] = finger.base, finger.lengths
+            values[f"wanted_axes{c}"] = finger.axes.reshape(1, -1)
+            values[f"capsule{c}"] = model.capsules[c]
+            values[f"wanted_point{c}"], values[f"wanted_force{c}"] = start.point[:, c], start.force[:, c]
+            values[f"helper{c}"] = _helpers(start.point[:, c], model.capsules[c])
+        values |= {f"weight.{term}": WEIGHTS[term] / count for term in self.problem.terms}
+        return values
+
+    def _result(self, start: WholeHand, runs: list[tuple[str, Solution]]) -> Refined:
+        solution = runs[-1][1]
+        values, count = solution.values, len(self.model.schedule.samples)
+        point, force = start.point.copy(), start.force.copy()
+        point[:, list(self.contacts)] = values["point"].reshape(count, -1, 3)
+        force[:, list(self.contacts)] = values["force"].reshape(count, -1, 3)
+        fingers, moved = [], {}
+        for c, old in zip(self.contacts, start.fingers, strict=True):
+            new = replace(
+                old,
+                base=values[f"base{c}"][0],
+                lengths=values[f"lengths{c}"][0],
+                axes=values[f"axes{c}"].reshape(-1, 2),
+                angles=values[f"angles{c}"][self.model.schedule.keyframe_samples],
+            )
+            fingers.append(new)
+            cosines = np.clip((new.axis_vectors * old.axis_vectors).sum(axis=1), -1, 1)
+            moved[self.model.contact_names[c]] = {
+                "base": float(np.linalg.norm(new.base - old.base)),
+                "lengths": float(np.abs(new.lengths - old.lengths).max()),
+                "axes": float(np.arccos(cosines).max()),
+            }
+        hand = replace(
+            start,
+            fingers=tuple(fingers),
+            angles=tuple(values[f"angles{c}"] for c in self.contacts),
+            position=values["pose"][:, :3],
+            vector=values["pose"][:, 3:],
+            point=point,
+            force=force,
+            solution=solution,
+        )
+        worst = max(solution.violations.items(), key=lambda item: item[1])
+        return Refined(hand, worst[1] <= ACCEPTED, True, worst, moved, tuple(runs))
+
+
+def _helpers(points: Array, capsule: Array) -> Array:
+    """Vectors (S, 3) well across the surface normal at each contact point, continuous along the motion."""
+    along = capsule[3:6] - capsule[:3]
+    helper = along / np.linalg.norm(along) if np.linalg.norm(along) > 1e-9 else np.eye(3)[0]
+    helpers = []
+    for point in points:
+        normal = point - capsule[:3] - np.clip((point - capsule[:3]) @ along / max(along @ along, 1e-12), 0, 1) * along
+        normal /= np.linalg.norm(normal)
+        across = helper - (helper @ normal) * normal
+        if np.linalg.norm(across) < 0.5:
+            across = np.eye(3)[np.argmin(np.abs(normal))]
+            across = across - (across @ normal) * normal
+        helper = across / np.linalg.norm(across)
+        helpers.append(helper)
+    return np.array(helpers)
