@@ -1,3 +1,35 @@
 """Design a robot hand for a task: its topology, its shape, its motion and its forces."""
 
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from casadi_hands.design import Design
+    from casadi_hands.pipeline import solve
+    from casadi_hands.task import load_task
+    from casadi_hands.verify import audit, replay
+
 __version__ = "0.1.0"
+__all__ = ["Design", "audit", "load_task", "replay", "solve"]
+
+_HOME = {
+    "Design": "casadi_hands.design",
+    "audit": "casadi_hands.verify",
+    "load_task": "casadi_hands.task",
+    "replay": "casadi_hands.verify",
+    "solve": "casadi_hands.pipeline",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first asked for: CasADi and Pinocchio take seconds to load."""
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    """Names of the module, those not imported yet among them."""
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,189 @@
+"""The commands; each imports what it needs when it runs, so that --help and a wrong option answer at once."""
+
+from __future__ import annotations
+
+import json
+import os
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from casadi_hands import __version__
+
+app = typer.Typer(
+    name="casadi-hands",
+    help="Design a robot hand for a task: its fingers, their joints and sizes, its motion and its forces.",
+    epilog="Start with: casadi-hands solve problems/horizontal_translation.yaml",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="markdown",
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+class Stage(StrEnum):
+    """The stages of a solve, in order (``casadi_hands.pipeline.STAGES``)."""
+
+    FLOATING = "floating"
+    SYNTHESIS = "synthesis"
+    WHOLE_HAND = "whole_hand"
+    REFINE = "refine"
+
+
+TaskFile = Annotated[Path, typer.Argument(metavar="TASK", help="A task file (YAML).", show_default=False)]
+Folder = Annotated[
+    Path, typer.Argument(metavar="DIR", help="A folder that `casadi-hands solve` wrote.", show_default=False)
+]
+Jobs = Annotated[
+    int | None,
+    typer.Option(min=1, help="Processes to use; the result does not depend on it.", show_default="all cores"),
+]
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        print(f"casadi-hands {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Options of the program itself."""
+
+
+@app.command()
+def solve(
+    task: TaskFile,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder to write; files of an earlier design in it are replaced.", show_default="results/TASK"
+        ),
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Seed of the random numbers.", show_default="the task's")
+    ] = None,
+    jobs: Jobs = None,
+    until: Annotated[Stage, typer.Option(help="Stop after this stage and write what there is.")] = Stage.REFINE,
+) -> None:
+    """Design a hand for a task.
+
+    Exits 0 when there is a design that does the task (and after --until), 1 when there is none, 2 when the task
+    cannot be used. What has been computed is written after every stage, so stopping it (Ctrl-C) loses little.
+    """
+    from casadi_hands.cli.progress import Reporter
+    from casadi_hands.cli.summary import design_summary
+    from casadi_hands.task import load_task
+
+    problem = load_task(task)
+    folder = out or Path("results") / task.stem
+    with Reporter(Console(stderr=True)) as reporter:
+        # Within the reporter, because CasADi and Pinocchio take seconds to load.
+        from casadi_hands import pipeline
+
+        try:
+            design = pipeline.solve(
+                problem, seed=seed, jobs=jobs, until=until.value, out=folder, progress=reporter.progress
+            )
+        except KeyboardInterrupt:
+            kept = (
+                f"what was computed is in {folder}" if (folder / "result.json").is_file() else "no stage was complete"
+            )
+            reporter.note(f"stopped; {kept}")
+            raise typer.Exit(130) from None
+    Console().print(design_summary(design, folder))
+    raise typer.Exit(1 if design.status == "failed" and until is Stage.REFINE else 0)
+
+
+@app.command()
+def check(task: TaskFile) -> None:
+    """Check a task file and print how it is understood; solves nothing."""
+    from casadi_hands.cli.task_summary import task_summary
+    from casadi_hands.task import load_task
+
+    Console().print(task_summary(load_task(task)))
+
+
+@app.command()
+def view(folder: Folder) -> None:
+    """Open a design's page in the browser: the hand and the object moving."""
+    from casadi_hands.view.page import open_page
+
+    print(open_page(folder))
+
+
+@app.command()
+def audit(
+    folder: Folder,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
+) -> None:
+    """Recompute a design's certificate from its files, without the optimiser.
+
+    Exits 1 if any figure misses its limit.
+    """
+    from casadi_hands import verify
+    from casadi_hands.cli.summary import audit_summary
+
+    found = verify.audit(folder)
+    if as_json:
+        record = {
+            "task": found.name,
+            "certified": found.certified,
+            "certificate": found.as_certificate(),
+            "reasons": found.reasons,
+        }
+        print(json.dumps(record, indent=1, ensure_ascii=False))
+    else:
+        Console().print(audit_summary(found))
+    raise typer.Exit(0 if found.certified else 1)
+
+
+@app.command()
+def replay(
+    folder: Folder,
+    perturb: Annotated[
+        int,
+        typer.Option(
+            min=0,
+            metavar="N",
+            help="Replay N times more, each with another mass, friction, joint bias, push and start pose.",
+        ),
+    ] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the perturbations.")] = 0,
+    jobs: Jobs = None,
+    video: Annotated[
+        Path | None, typer.Option(help="Write a film of the replay (.mp4 or .gif).", show_default=False)
+    ] = None,
+) -> None:
+    """Play a design in the physics engine MuJoCo and say how far the object strays from the plan.
+
+    Exits 1 if the hand drops the object when nothing perturbs it. Needs MuJoCo: pip install mujoco
+    """
+    from casadi_hands import verify
+    from casadi_hands.cli.summary import replay_summary
+
+    if video is None:
+        nominal = verify.replay(folder)
+    else:
+        from casadi_hands.verify.video import film
+
+        nominal = film(folder, video)
+    perturbed = verify.replay_many(folder, perturb, seed, jobs or os.cpu_count() or 1) if perturb else []
+    Console().print(replay_summary(nominal, perturbed))
+    raise typer.Exit(1 if nominal.dropped else 0)
+
+
+@app.command()
+def fields() -> None:
+    """Print every field of a task file with its default and meaning (Markdown)."""
+    from casadi_hands.task import describe_fields
+
+    print(describe_fields())

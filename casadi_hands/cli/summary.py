@@ -1,0 +1,107 @@
+"""What a command says at its end: a task as understood, a design, an audit, replays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.box import SIMPLE_HEAD
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from casadi_hands.verify.report import show
+
+if TYPE_CHECKING:
+    from casadi_hands.design import Design
+    from casadi_hands.verify import Audit, Replay
+
+_STYLES = {"certified": "bold green", "feasible": "bold yellow", "failed": "bold red"}
+
+
+def design_summary(design: Design, folder: Path) -> RenderableType:
+    """How a solve ended: status, joints, certificate, reason, where the files are."""
+    parts: list[RenderableType] = [_headline(design.task.name, design.status)]
+    if design.certificate:
+        parts.append(certificate_table(design.certificate))
+    if design.reason:
+        parts.append(Text(f"{'why' if design.status == 'failed' else 'note'}: {design.reason}"))
+    if design.hand is not None:
+        fingers = ", ".join(f"{finger.name} {len(finger.links)}" for finger in design.hand.fingers)
+        parts.append(Text(f"joints: {fingers}; {design.hand.degrees_of_freedom} in all"))
+    if design.seconds:
+        # The total last, whatever order the stages were written in.
+        spent = sorted(design.seconds.items(), key=lambda item: item[0] == "total")
+        parts.append(Text("time: " + ", ".join(f"{name.replace('_', ' ')} {value:.0f} s" for name, value in spent)))
+    parts.append(Text(f"files: {folder}"))
+    if design.motion is not None:
+        parts.append(Text(f"see it move: casadi-hands view {folder}"))
+    return Group(*parts)
+
+
+def audit_summary(found: Audit) -> RenderableType:
+    """The figures of an audit and what is wrong."""
+    headline = _headline(found.name, "certified" if found.certified else "not certified")
+    return Group(headline, certificate_table(found.as_certificate()), *(Text(f"- {why}") for why in found.reasons))
+
+
+def certificate_table(certificate: Mapping[str, Mapping[str, Any]]) -> Table:
+    """The ``certificate`` of result.json for the terminal: the worst value of each figure, and its limit."""
+    table = Table("figure", box=SIMPLE_HEAD)
+    for column in ("value", "limit"):
+        table.add_column(column, justify="right", no_wrap=True)
+    table.add_column("unit")
+    table.add_column("")
+    for name, figure in certificate.items():
+        value, limit, unit = figure["value"], figure["limit"], figure.get("unit", "")
+        verdict = ("", "") if limit is None else ("holds", "green") if figure["holds"] else ("missed", "red")
+        table.add_row(
+            name.replace("_", " "),
+            "none" if value is None else _number(value, unit)[0],
+            "" if limit is None else _number(limit, unit)[0],
+            _number(0.0, unit)[1],
+            Text(*verdict),
+        )
+    return table
+
+
+def replay_summary(nominal: Replay, perturbed: Sequence[Replay]) -> RenderableType:
+    """Errors of the replay as planned and of those perturbed ones that kept the object."""
+    table = Table("", box=SIMPLE_HEAD)
+    for column in ("mean, mm", "largest", "at the end", "mean, deg", "largest", "at the end"):
+        table.add_column(column, justify="right")
+    table.add_row("as planned", *_errors([nominal], np.mean))
+    held = [each for each in perturbed if not each.dropped]
+    if held:
+        table.add_row(f"{len(held)} perturbed, mean", *_errors(held, np.mean))
+        table.add_row(f"{len(held)} perturbed, worst", *_errors(held, np.max))
+    lost = f"; lost at the end: {', '.join(nominal.lost_contacts)}" if nominal.lost_contacts else ""
+    parts: list[RenderableType] = [
+        Text("The object's distance and angle from the plan"),
+        table,
+        Text(f"as planned: {'dropped' if nominal.dropped else 'not dropped'}{lost}"),
+    ]
+    if perturbed:
+        parts.append(Text(f"perturbed: dropped in {len(perturbed) - len(held)} of {len(perturbed)}"))
+    return Group(*parts)
+
+
+def _number(value: float, unit: str) -> tuple[str, str]:
+    """A figure's value and its unit as shown to a reader."""
+    number, _, suffix = show(value, unit).partition(" ")
+    return number, suffix.removeprefix("of the ")
+
+
+def _headline(name: str, status: str) -> Text:
+    return Text.assemble((name, "bold"), ": ", (status, _STYLES.get(status, "bold red")))
+
+
+def _errors(replays: Sequence[Replay], reduce: Callable[[list[float]], Any]) -> list[str]:
+    """Position (mm) and angle (deg) errors - mean, largest, final - reduced over the replays."""
+    return [
+        f"{scale * reduce([getattr(each, f'{kind}_{which}') for each in replays]):.3g}"
+        for kind, scale in (("position", 1e3), ("angle", 1.0))
+        for which in ("mean", "max", "final")
+    ]

@@ -1,0 +1,105 @@
+"""A task in a screenful: how the program understands the file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from casadi_hands.task import Capsule, Goal, Limits, Task
+
+
+def task_summary(task: Task) -> RenderableType:
+    """What `check` prints: every quantity with its unit, lengths in mm, defaults filled in."""
+    table = Table.grid(padding=(0, 2))
+    for name, text in _lines(task):
+        table.add_row(Text(name, style="bold"), Text(text))
+    title = Text.assemble((task.name, "bold"), f": {' '.join(task.about.split())}" if task.about else "")
+    return Group(title, table)
+
+
+def _lines(task: Task) -> Iterator[tuple[str, str]]:
+    yield "object", _object(task)
+    yield "", f"inertia, principal: {_numbers(np.linalg.eigvalsh(np.array(task.object.inertia)))} kg·m²"
+    yield "palm", _palm(task)
+    for i, (name, finger) in enumerate(task.fingers.items()):
+        yield "" if i else "fingers", f"{name} touches the object at {_mm(finger.touches)}"
+    yield "links", _links(task)
+    for i, goal in enumerate(task.motion):
+        yield "" if i else "goals", f"{goal.at:g} s: {_goal(goal)}"
+    samples = int(np.ceil(task.duration / task.time_step - 1e-9)) + 1
+    yield "motion", f"{task.duration:g} s, {samples} samples, {task.keyframes_between} keyframes between goals"
+    yield "world", _world(task)
+    for each in task.perturbations:
+        push = f"force {_numbers(each.force)} N, torque {_numbers(each.torque)} N·m"
+        yield "disturbed", f"from {each.start:g} s to {each.end:g} s: {push}"
+    search = task.search
+    yield (
+        "search",
+        (
+            f"{search.trials} trials a finger and joint count, {search.recombinations} recombinations, "
+            f"at most {search.max_joints} joints a finger, seed {search.seed}"
+        ),
+    )
+    changed = {name: value for name, value in task.limits if value != getattr(Limits(), name)}
+    if changed:
+        yield (
+            "limits",
+            "changed from their defaults: " + ", ".join(f"{name} {value:g}" for name, value in changed.items()),
+        )
+
+
+def _object(task: Task) -> str:
+    capsules = sum(isinstance(shape, Capsule) for shape in task.object.shapes)
+    kinds = {"capsule": capsules, "sphere": len(task.object.shapes) - capsules}
+    shapes = " and ".join(f"{count} {kind}{'s' * (count > 1)}" for kind, count in kinds.items() if count)
+    return f"{task.object.mass:g} kg; {shapes}, {2e3 * task.object.half_extent:.4g} mm at its longest"
+
+
+def _palm(task: Task) -> str:
+    palm = task.palm
+    moves = "the program may move it" if palm.may_move else "moves as the task says" if palm.motion else "stands still"
+    disc = f"disc of {1e3 * palm.radius:.4g} mm radius, {1e3 * palm.thickness:.4g} mm thick"
+    return f"{disc}, at {_mm(palm.position)}, fingers point to {_numbers(palm.facing)}; {moves}"
+
+
+def _links(task: Task) -> str:
+    hand, motor = task.hand, task.actuator
+    low, high = (1e3 * length for length in hand.link_length)
+    lower, upper = hand.joint_limits
+    motors = f"motors of {motor.torque:g} N·m and {motor.speed:g} rad/s" if motor else "motors without limits"
+    sizes = f"radius {1e3 * hand.link_radius:.4g} mm, {low:.4g} to {high:.4g} mm long"
+    return f"{sizes}; joints {lower:g} to {upper:g} deg; {motors}"
+
+
+def _goal(goal: Goal) -> str:
+    if goal.tool_at is not None:
+        return f"tool at {_mm(goal.tool_at)}"
+    turn = (
+        f"turned {goal.rotation.degrees:g} deg about {_numbers(goal.rotation.axis)}"
+        if goal.rotation.degrees
+        else "upright"
+    )
+    return f"{_mm(goal.position or (0.0, 0.0, 0.0))}, {turn}"
+
+
+def _world(task: Task) -> str:
+    ground = (
+        f"ground at {1e3 * task.ground.height:.4g} mm, friction {task.ground.friction:g}"
+        if task.ground
+        else "no ground"
+    )
+    gravity = f"gravity {_numbers(task.gravity)} m/s²" if any(task.gravity) else "no gravity"
+    return f"{gravity}; friction {task.friction:g}; {ground}"
+
+
+def _mm(point: Sequence[float]) -> str:
+    return f"{_numbers([1e3 * value for value in point])} mm"
+
+
+def _numbers(values: Sequence[float] | np.ndarray) -> str:
+    # Adding 0 turns -0 into 0.
+    return f"[{', '.join(f'{round(float(value), 12) + 0:.4g}' for value in values)}]"
