@@ -16,7 +16,8 @@ def segment_distance(start: SX, end: SX, other_start: SX, other_end: SX) -> SX:
 
     The closest points solve a box-constrained quadratic in the two fractions s and t, to which
     ``tie * ((s - 1/2)² + (t - 1/2)²)`` is added so that parallel segments have one solution; the distance is
-    rounded off at zero. Errors are below 1e-4 of the lengths.
+    rounded off at zero. It is never too small, and too large by at most 1e-4 of the summed lengths where segments
+    are 0.3 or more apart, by 1e-3 where they nearly touch and are nearly parallel.
     """
     along, other_along, between = end - start, other_end - other_start, start - other_start
     length2, other_length2 = ca.sumsqr(along), ca.sumsqr(other_along)
