@@ -57,8 +57,8 @@ def test_inside_cap_and_cylinder_in_closed_form() -> None:
 
 def test_sphere_is_a_capsule_of_no_length() -> None:
     center = np.array([1.0, -2, 0.5])
-    projection, _, distance = project(center + [0, 0, 3], center, center, 0.7)
-    np.testing.assert_allclose(projection, center + [0, 0, 0.7], atol=1e-12)
+    projection, _, distance = project(center + np.array([0, 0, 3]), center, center, 0.7)
+    np.testing.assert_allclose(projection, center + np.array([0, 0, 0.7]), atol=1e-12)
     assert distance == pytest.approx(2.3, abs=1e-12)
 
 

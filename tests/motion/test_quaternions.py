@@ -94,7 +94,7 @@ def test_angular_motion_of_a_body_that_precesses_in_closed_form() -> None:
 
 @pytest.mark.parametrize("expected", [[0, 0, 3.0], [0, 0, -3.0], [0, 0, 4.5], [0, 0, -5.2], [0, 0, 7.0], [0, 0, 0.1]])
 def test_nearest_exponential_continues_a_motion(expected: list[float]) -> None:
-    nearby = np.array(expected) + [0, 0, 0.2]
+    nearby = np.array(expected) + np.array([0, 0, 0.2])
     found = nearest_exponential(Rotation.from_rotvec(nearby).as_matrix(), np.array(expected))
     np.testing.assert_allclose(found, nearby, atol=1e-9)
 

@@ -1,0 +1,162 @@
+"""Assembled derivatives against CasADi's own automatic ones, on kernels bound in every way the stages use."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+from casadi import DM, MX, Function
+
+from casadi_hands.nlp import Kernel, Problem, Rows
+
+RANDOM = np.random.default_rng(4)
+
+
+def spring() -> Kernel:
+    """Two terms and a constraint in two local variables; one parameter for each instance, one for all."""
+    kernel = Kernel("spring")
+    a, b = kernel.variable("a", 2), kernel.variable("b", 3)
+    own, shared = kernel.parameter("own", 2), kernel.parameter("shared")
+    kernel.cost("stretch", ca.vertcat(ca.sin(a[0]) * b[2] - own[0], a[1] * b[0] * shared))
+    kernel.cost("bump", ca.exp(ca.dot(a, own)) + b[1] ** 2, "sum")
+    kernel.constrain("circle", ca.vertcat(ca.sumsqr(a) * b[0], b[1]))
+    kernel.constrain("product", a[0] * b[2] * own[1])
+    return kernel
+
+
+def pull() -> Kernel:
+    """Shares the term ``stretch``; no constraints, no parameters."""
+    kernel = Kernel("pull")
+    b = kernel.variable("b", 3)
+    kernel.cost("stretch", ca.cos(b[0]) * b[1])
+    kernel.cost("far", b[2] ** 2 * b[0], "sum")
+    return kernel
+
+
+def only_bounds() -> Kernel:
+    """A constraint and no cost."""
+    kernel = Kernel("only_bounds")
+    a = kernel.variable("a", 2)
+    kernel.constrain("hyperbola", a[0] * a[1])
+    return kernel
+
+
+class Example:
+    """The same program twice: assembled, and written out instance by instance for CasADi to differentiate."""
+
+    def __init__(self) -> None:
+        self.problem = problem = Problem()
+        first = problem.variable("first", (4, 2))
+        second = problem.variable("second", (3, 3), -1, 1)
+        own = problem.parameter("own", (5, 2))
+        shared = problem.parameter("shared", (1, 1))
+        self.mixing = [RANDOM.normal(size=(5, 4)), RANDOM.normal(size=(5, 3))]
+        self.bindings: list[tuple[Kernel, list[np.ndarray], list[np.ndarray]]] = []
+        self._bind(spring(), [first.combine(self.mixing[0]), second.combine(self.mixing[1])], [own, shared])
+        self._bind(pull(), [second.take([0, 2, 2, 1])], [])
+        self._bind(only_bounds(), [first.combine(np.abs(self.mixing[0]))], [])
+
+    def _bind(self, kernel: Kernel, rows: list[Rows], parameters: list[np.ndarray]) -> None:
+        width = sum(g.numel() for g in kernel.constraints.values())
+        bounds = {name: (-np.inf, np.arange(g.numel()) + 0.5) for name, g in kernel.constraints.items()}
+        self.problem.bind(kernel, rows, parameters, bounds)
+        size = self.problem.variables.size
+        dense = [np.zeros((r.count, r.width, size)) for r in rows]
+        for full, r in zip(dense, rows, strict=True):
+            full[..., : r.matrix.shape[1]] = r.matrix.toarray().reshape(r.count, r.width, -1)
+        self.bindings.append((kernel, dense, parameters))
+        assert width == sum(g.numel() for g in kernel.constraints.values())
+
+    def written_out(self) -> tuple[MX, MX, MX, MX]:
+        """x, p, f and g without any assembly."""
+        layout = self.problem.parameters
+        x, p = MX.sym("x", self.problem.variables.size), MX.sym("p", layout.size)
+        f, g = MX(0), []
+        for kernel, rows, parameters in self.bindings:
+            terms = ca.vertcat(*kernel.terms.values()) if kernel.terms else ca.SX.zeros(0, 1)
+            constraints = ca.vertcat(*kernel.constraints.values()) if kernel.constraints else ca.SX.zeros(0, 1)
+            function = Function("k", [kernel.variables, kernel.parameters], [terms, constraints])
+            weights = [p[int(layout[f"weight.{name}"][0])] for name in kernel.terms]
+            for k in range(len(rows[0])):
+                local = ca.vertcat(*[ca.mtimes(MX(DM(r[k])), x) for r in rows])
+                entries = [int(i) for q in parameters for i in np.broadcast_to(q, (len(rows[0]), q.shape[1]))[k]]
+                values, bounded = function(local, p[entries] if entries else MX.zeros(0, 1))
+                f = f + sum((w * values[i] for i, w in enumerate(weights)), MX(0))
+                g.append(bounded)
+        return x, p, f, ca.vertcat(*g)
+
+
+@pytest.fixture(scope="module")
+def example() -> Example:
+    return Example()
+
+
+@pytest.fixture(scope="module")
+def at(example: Example) -> tuple[np.ndarray, np.ndarray]:
+    return RANDOM.normal(size=example.problem.variables.size), RANDOM.uniform(0.5, 2, example.problem.parameters.size)
+
+
+def test_value_gradient_and_jacobian(example: Example, at) -> None:
+    x, p, f, g = example.written_out()
+    truth = Function("t", [x, p], [f, g, ca.gradient(f, x), ca.jacobian(g, x)])(*at)
+    functions = example.problem.functions()
+    value, constraints = functions["nlp"](*at)
+    again, gradient = functions["grad_f"](*at)
+    same, jacobian = functions["jac_g"](*at)
+    assert float(value) == pytest.approx(float(truth[0]), rel=1e-13)
+    assert float(again) == float(value)
+    assert constraints.shape == (5 * 3 + 5, 1)
+    for found, expected in ((constraints, truth[1]), (same, truth[1]), (gradient, truth[2]), (jacobian, truth[3])):
+        np.testing.assert_allclose(np.asarray(found), np.asarray(expected), rtol=1e-12, atol=1e-12)
+
+
+def test_hessian_of_the_lagrangian_is_the_upper_triangle(example: Example, at) -> None:
+    x, p, f, g = example.written_out()
+    scale, multipliers = MX.sym("s"), MX.sym("l", g.numel())
+    hessian = ca.hessian(scale * f + ca.dot(multipliers, g), x)[0]
+    arguments = (*at, 0.7, RANDOM.normal(size=g.numel()))
+    truth = np.asarray(Function("t", [x, p, scale, multipliers], [hessian])(*arguments))
+    found = example.problem.functions()["hess_lag"](*arguments)
+    np.testing.assert_allclose(np.asarray(found), np.triu(truth), rtol=1e-11, atol=1e-11)
+    assert found.sparsity().is_triu()
+
+
+def test_gradient_agrees_with_finite_differences(example: Example, at) -> None:
+    functions, h = example.problem.functions(), 1e-6
+    values = [[float(functions["nlp"](at[0] + s * h * e, at[1])[0]) for s in (1, -1)] for e in np.eye(len(at[0]))]
+    differences = np.array([(a - b) / (2 * h) for a, b in values])
+    np.testing.assert_allclose(np.asarray(functions["grad_f"](*at)[1]).ravel(), differences, rtol=1e-5, atol=1e-5)
+
+
+def test_terms_by_name_sum_to_the_objective_and_shared_names_add_up(example: Example, at) -> None:
+    problem = example.problem
+    terms = np.asarray(problem.functions()["terms"](*at)).ravel()
+    assert problem.terms == ["stretch", "bump", "far"]
+    assert terms.sum() == pytest.approx(float(problem.functions()["nlp"](*at)[0]), rel=1e-12)
+    # ``stretch`` of both kernels by hand.
+    x, p = problem.variables.unpack(at[0]), problem.parameters.unpack(at[1])
+    a, b = example.mixing[0] @ x["first"], example.mixing[1] @ x["second"]
+    one = (np.sin(a[:, 0]) * b[:, 2] - p["own"][:, 0]) ** 2 + (a[:, 1] * b[:, 0] * p["shared"][0, 0]) ** 2
+    b = x["second"][[0, 2, 2, 1]]
+    two = (np.cos(b[:, 0]) * b[:, 1]) ** 2
+    assert terms[0] == pytest.approx(p["weight.stretch"][0] * (one.sum() + two.sum()), rel=1e-12)
+
+
+def test_bounds_of_constraints_follow_their_rows(example: Example) -> None:
+    assert example.problem.constraint_upper.tolist() == [0.5, 1.5, 0.5] * 5 + [0.5] * 5
+    assert (example.problem.constraint_lower == -np.inf).all()
+
+
+def test_a_kernel_bound_to_wrong_rows_is_refused() -> None:
+    problem = Problem()
+    narrow = problem.variable("narrow", (4, 1))
+    with pytest.raises(ValueError, match=r"pull\.b: rows \(4, 1\), expected \(4, 3\)"):
+        problem.bind(pull(), [narrow])
+    wide = problem.variable("wide", (4, 2))
+    three = problem.variable("three", (4, 3))
+    with pytest.raises(ValueError, match="spring: 2 parameters, expected 3"):
+        problem.bind(spring(), [wide, three], [problem.parameter("own", (4, 2))])
+    kernel = Kernel("twice")
+    kernel.cost("once", kernel.variable("x", 1))
+    with pytest.raises(KeyError, match="kernel 'twice' already has a term 'once'"):
+        kernel.cost("once", ca.SX(0))

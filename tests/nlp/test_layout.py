@@ -1,0 +1,63 @@
+"""Named arrays in a vector, and rows of linear expressions, against plain NumPy."""
+
+import numpy as np
+import pytest
+
+from casadi_hands.nlp import Layout, Rows
+
+RANDOM = np.random.default_rng(0)
+
+
+def example() -> Layout:
+    layout = Layout()
+    layout.add("pose", (4, 6))
+    layout.add("scalar", (1,))
+    layout.add("force", (3, 2))
+    return layout
+
+
+def test_unpack_undoes_pack() -> None:
+    layout = example()
+    values = {name: RANDOM.normal(size=layout[name].shape) for name in layout.names()}
+    vector = layout.pack(values, np.zeros(layout.size))
+    assert layout.size == 4 * 6 + 1 + 6
+    assert sorted(vector) == sorted(np.concatenate([v.ravel() for v in values.values()]))
+    for name, value in layout.unpack(vector).items():
+        np.testing.assert_array_equal(value, values[name])
+
+
+def test_pack_keeps_the_rest_broadcasts_and_copies() -> None:
+    layout, start = example(), np.arange(31.0)
+    packed = layout.pack({"force": [7, 8]}, start)
+    np.testing.assert_array_equal(packed[:25], start[:25])
+    np.testing.assert_array_equal(layout.unpack(packed)["force"], [[7, 8]] * 3)
+    assert start[-1] == 30
+
+
+def test_unknown_and_repeated_names_are_refused() -> None:
+    layout = example()
+    with pytest.raises(KeyError, match="'pse' is not one of pose, scalar, force"):
+        layout.pack({"pse": 0.0}, np.zeros(layout.size))
+    with pytest.raises(KeyError, match="'pose' is already in the layout"):
+        layout.add("pose", (1, 1))
+    assert "pose" in layout
+    assert "pse" not in layout
+
+
+def test_rows_read_combine_take_and_split() -> None:
+    indices = RANDOM.permutation(12).reshape(4, 3)
+    x, weights = RANDOM.normal(size=12), RANDOM.normal(size=(5, 4))
+    rows = Rows.of(indices, 12)
+    plain = x[indices]
+
+    def read(rows: Rows) -> np.ndarray:
+        return (rows.matrix @ x).reshape(rows.count, rows.width)
+
+    np.testing.assert_array_equal(read(rows), plain)
+    np.testing.assert_allclose(read(rows.combine(weights)), weights @ plain, atol=1e-14)
+    np.testing.assert_array_equal(read(rows.take([2, 2, 0])), plain[[2, 2, 0]])
+    np.testing.assert_array_equal(read(rows.entries(1, 3)), plain[:, 1:3])
+    np.testing.assert_array_equal(read(rows.constant(3)), plain[[0, 0, 0]])
+    np.testing.assert_allclose(
+        read(rows.combine(weights).entries(0, 2).take([4])), (weights @ plain)[[4], :2], atol=1e-14
+    )

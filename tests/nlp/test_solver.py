@@ -1,0 +1,125 @@
+"""Solves against SciPy on the same problem, and results by name."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.optimize import NonlinearConstraint, minimize
+
+from casadi_hands.nlp import Kernel, Options, Problem, Solution, Solver
+
+EXACT = Options(max_iter=200, tol=1e-10, acceptable_tol=1e-10, constr_viol_tol=1e-10)
+TARGETS = np.array([[0.2, 1.4], [-0.3, 0.8], [1.5, 0.1]])
+WEIGHTS = {"weight.near": 2.0, "weight.smooth": 0.7}
+
+
+def chain() -> Problem:
+    """Three points near targets, smooth, each outside a circle and within a box."""
+    problem = Problem()
+    points = problem.variable("points", (3, 2), -1.0, [[1.1, 2.0]])
+    near, smooth, outside = Kernel("near"), Kernel("smooth"), Kernel("outside")
+    near.cost("near", near.variable("x", 2) - near.parameter("target", 2))
+    problem.bind(near, [points], [problem.parameter("targets", (3, 2))])
+    before, after = smooth.variable("a", 2), smooth.variable("b", 2)
+    smooth.cost("smooth", (after - before) ** 2, "sum")
+    problem.bind(smooth, [points.take([0, 1]), points.take([1, 2])])
+    outside.constrain("radius", ca.sumsqr(outside.variable("x", 2)))
+    problem.bind(outside, [points], [], {"radius": (1.0, np.inf)})
+    return problem
+
+
+def solve(**changes: object) -> Solution:
+    start = {"points": TARGETS * 1.2}
+    return Solver(chain()).solve(start, {"targets": TARGETS, **WEIGHTS}, EXACT, **changes)  # type: ignore[arg-type]
+
+
+def objective(x: np.ndarray) -> float:
+    points = x.reshape(3, 2)
+    return float(2.0 * ((points - TARGETS) ** 2).sum() + 0.7 * (np.diff(points, axis=0) ** 2).sum())
+
+
+@pytest.fixture(scope="module")
+def solution() -> Solution:
+    return solve()
+
+
+@pytest.mark.filterwarnings("ignore:delta_grad")
+@pytest.mark.parametrize("method", ["SLSQP", "trust-constr"])
+def test_same_optimum_as_scipy(method: str, solution: Solution) -> None:
+    bounds = [(-1, 1.1), (-1, 2)] * 3
+    outside = NonlinearConstraint(lambda x: (x.reshape(3, 2) ** 2).sum(axis=1), 1, np.inf)
+    options = {"maxiter": 500} if method == "SLSQP" else {"maxiter": 2000, "gtol": 1e-9, "xtol": 1e-10}
+    start = np.clip((TARGETS * 1.2).ravel(), -1, [1.1, 2] * 3)
+    tolerance = 1e-12 if method == "SLSQP" else None
+    found = minimize(
+        objective, start, method=method, bounds=bounds, constraints=outside, options=options, tol=tolerance
+    )
+    assert solution.status == "Solve_Succeeded"
+    np.testing.assert_allclose(solution.values["points"].ravel(), found.x, atol=1e-4)
+    assert solution.objective == pytest.approx(found.fun, abs=1e-6)
+
+
+def test_results_by_name(solution: Solution) -> None:
+    points = solution.values["points"]
+    assert points.shape == (3, 2)
+    assert solution.terms["near"] == pytest.approx(2.0 * ((points - TARGETS) ** 2).sum(), rel=1e-12)
+    assert solution.terms["smooth"] == pytest.approx(0.7 * (np.diff(points, axis=0) ** 2).sum(), rel=1e-12)
+    assert sum(solution.terms.values()) == pytest.approx(solution.objective, rel=1e-12)
+    assert solution.violation < 1e-8
+    # The box and one circle hold something back, and their multipliers say so.
+    assert np.abs(solution.multipliers["x"]).max() > 0.1
+    assert np.abs(solution.multipliers["g"]).max() > 0.1
+
+
+def test_box_bounds_are_kept_declared_and_changed(solution: Solution) -> None:
+    assert solution.values["points"][:, 0].max() == pytest.approx(1.1, abs=1e-6)
+    changed = solve(upper={"points": 0.9}, lower={"points": [[-0.2, 0.3]]})
+    assert (changed.values["points"] <= 0.9 + 1e-7).all()
+    assert (changed.values["points"] >= np.array([-0.2, 0.3]) - 1e-7).all()
+    fixed = np.array([[0.5, 1.0], [0.0, 1.2], [1.0, 1.0]])
+    held = solve(upper={"points": fixed}, lower={"points": fixed})
+    np.testing.assert_allclose(held.values["points"], fixed, atol=1e-7)
+    assert held.objective == pytest.approx(objective(fixed.ravel()), abs=1e-6)
+
+
+def test_violation_of_an_impossible_problem_is_reported_not_hidden() -> None:
+    inside = solve(upper={"points": 0.5}, lower={"points": -0.5})
+    # The farthest corner of the box is at a squared radius of 0.5 where 1 is asked.
+    assert inside.violation == pytest.approx(0.5, abs=1e-3)
+    assert inside.status != "Solve_Succeeded"
+
+
+def test_another_weight_is_another_solution_of_the_same_solver() -> None:
+    solver = Solver(chain())
+    values = {"targets": TARGETS, **WEIGHTS}
+    loose = solver.solve({}, values, EXACT)
+    stiff = solver.solve({}, {**values, "weight.smooth": 70.0}, EXACT)
+    assert np.abs(np.diff(stiff.values["points"], axis=0)).sum() < np.abs(np.diff(loose.values["points"], axis=0)).sum()
+    assert solver.evaluate(loose.values, values) == pytest.approx(loose.terms)
+
+
+def test_a_missing_parameter_and_unknown_names_are_named() -> None:
+    solver = Solver(chain())
+    with pytest.raises(KeyError, match=r"parameters without a value: targets, weight\.smooth"):
+        solver.solve({}, {"weight.near": 1.0})
+    with pytest.raises(KeyError, match="'pionts' is not one of points"):
+        solver.solve({"pionts": 0.0}, {"targets": TARGETS, **WEIGHTS})
+    with pytest.raises(KeyError, match="'points' is not one of targets"):
+        solver.solve({}, {"targets": TARGETS, **WEIGHTS, "points": 0.0})
+
+
+def test_a_warm_start_at_the_solution_stays() -> None:
+    cold = solve()
+    extra = (("warm_start_init_point", "yes"), ("warm_start_bound_push", 1e-9), ("warm_start_mult_bound_push", 1e-9))
+    options = Options(200, 1e-8, 1e-8, 1e-8, 1e-8, extra)
+    again = Solver(chain()).solve(cold.values, {"targets": TARGETS, **WEIGHTS}, options, warm=cold)
+    assert again.iterations < cold.iterations
+    np.testing.assert_allclose(again.values["points"], cold.values["points"], atol=1e-6)
+
+
+def test_an_iteration_cap_ends_with_a_value() -> None:
+    stopped = Solver(chain()).solve({}, {"targets": TARGETS, **WEIGHTS}, Options(max_iter=1))
+    assert stopped.status == "Maximum_Iterations_Exceeded"
+    assert stopped.iterations == 1
+    assert np.isfinite(stopped.values["points"]).all()

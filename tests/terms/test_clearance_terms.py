@@ -1,0 +1,69 @@
+"""Distances of bodies against coal's."""
+
+import itertools
+
+import casadi as ca
+import coal
+import numpy as np
+import pytest
+
+from casadi_hands.terms import clearance
+
+RADIUS = 0.1
+# A finger of three links, well away from what it is measured against.
+JOINTS = np.array([[0.2, 0, 0], [0.3, 0.2, 0.8], [0.1, 0.9, 1.3], [-0.6, 1.2, 1.2]])
+OTHER = np.array([[-0.7, 0, 0], [-0.9, -0.4, 0.9], [-0.2, -0.8, 1.6]])
+PRIMITIVES = np.array([[-1, 0, 2.2, 1, 0.2, 2.4, 0.3], [1.2, 1, 1, 1.2, 1, 1, 0.25]])
+
+
+def links(points: np.ndarray) -> list[tuple[ca.DM, ca.DM]]:
+    return [(ca.DM(a), ca.DM(b)) for a, b in itertools.pairwise(points)]
+
+
+def coal_distance(a, b, other_a, other_b, radius: float, other_radius: float) -> float:
+    shapes = []
+    for start, end, r in ((a, b, radius), (other_a, other_b, other_radius)):
+        along = np.asarray(end) - start
+        length = np.linalg.norm(along)
+        z = along / length if length else np.array([0, 0, 1.0])
+        x = np.linalg.svd(z[None])[2][1]
+        frame = coal.Transform3s(np.column_stack([x, np.cross(z, x), z]), (np.asarray(start) + end) / 2)
+        shapes += [coal.Capsule(r, length) if length else coal.Sphere(r), frame]
+    return coal.distance(*shapes, coal.DistanceRequest(), coal.DistanceResult())
+
+
+def test_links_and_object() -> None:
+    found = np.asarray(clearance.links_and_object(links(JOINTS), ca.DM(RADIUS), ca.DM(PRIMITIVES.T))).ravel()
+    expected = [
+        coal_distance(a, b, p[:3], p[3:6], RADIUS, p[6]) for a, b in itertools.pairwise(JOINTS) for p in PRIMITIVES
+    ]
+    np.testing.assert_allclose(found, expected, atol=5e-4)
+
+
+def test_links_of_two_fingers_and_of_one() -> None:
+    found = np.asarray(clearance.links_and_links(links(JOINTS), links(OTHER), ca.DM(RADIUS))).ravel()
+    expected = [
+        coal_distance(*JOINTS[i : i + 2], *OTHER[j : j + 2], RADIUS, RADIUS) for i in range(3) for j in range(2)
+    ]
+    np.testing.assert_allclose(found, expected, atol=5e-4)
+    own = np.asarray(clearance.links_of_one(links(JOINTS), ca.DM(RADIUS))).ravel()
+    np.testing.assert_allclose(own, [coal_distance(*JOINTS[:2], *JOINTS[2:], RADIUS, RADIUS)], atol=5e-4)
+    assert clearance.links_of_one(links(JOINTS[:3]), ca.SX(RADIUS)).numel() == 0
+
+
+def test_links_and_palm_are_seen_beside_above_and_below_its_rim() -> None:
+    # The palm is a coal cylinder below z = 0; the far end of the first link, middles and ends of the others.
+    found = np.asarray(clearance.links_and_palm(links(JOINTS), ca.DM(RADIUS), ca.DM(0.5))).ravel()
+    palm, frame = coal.Cylinder(0.5, 10), coal.Transform3s(np.eye(3), np.array([0, 0, -5.0]))
+    points = [JOINTS[1], JOINTS[1:3].mean(axis=0), JOINTS[2], JOINTS[2:].mean(axis=0), JOINTS[3]]
+    for value, point in zip(found, points, strict=True):
+        at = coal.Transform3s(np.eye(3), point)
+        sphere = coal.Sphere(RADIUS)
+        truth = coal.distance(palm, frame, sphere, at, coal.DistanceRequest(), coal.DistanceResult())
+        assert value == pytest.approx(truth, abs=1e-5)
+
+
+def test_links_and_ground_are_heights_along_its_normal() -> None:
+    up = np.array([1, 2, 2]) / 3
+    found = np.asarray(clearance.links_and_ground(links(JOINTS), ca.DM(RADIUS), ca.DM(up), ca.DM(-0.4))).ravel()
+    np.testing.assert_allclose(found, JOINTS @ up + 0.4 - RADIUS, atol=1e-12)
