@@ -69,9 +69,10 @@ def certificate_table(certificate: Mapping[str, Mapping[str, Any]]) -> Table:
 
 def replay_summary(nominal: Replay, perturbed: Sequence[Replay]) -> RenderableType:
     """Errors of the replay as planned and of those perturbed ones that kept the object."""
-    table = Table("", box=SIMPLE_HEAD)
-    for column in ("mean, mm", "largest", "at the end", "mean, deg", "largest", "at the end"):
-        table.add_column(column, justify="right")
+    table = Table(box=SIMPLE_HEAD, collapse_padding=True, pad_edge=False)
+    table.add_column("", no_wrap=True)
+    for column in ("mean mm", "max mm", "end mm", "mean deg", "max deg", "end deg"):
+        table.add_column(column, justify="right", no_wrap=True)
     table.add_row("as planned", *_errors([nominal], np.mean))
     held = [each for each in perturbed if not each.dropped]
     if held:

@@ -30,8 +30,8 @@ def _lines(task: Task) -> Iterator[tuple[str, str]]:
     yield "links", _links(task)
     for i, goal in enumerate(task.motion):
         yield "" if i else "goals", f"{goal.at:g} s: {_goal(goal)}"
-    samples = int(np.ceil(task.duration / task.time_step - 1e-9)) + 1
-    yield "motion", f"{task.duration:g} s, {samples} samples, {task.keyframes_between} keyframes between goals"
+    samples = f"samples at most {task.time_step:g} s apart"
+    yield "motion", f"{task.duration:g} s, {task.keyframes_between} keyframes between goals, {samples}"
     yield "world", _world(task)
     for each in task.perturbations:
         push = f"force {_numbers(each.force)} N, torque {_numbers(each.torque)} N·m"

@@ -1,0 +1,299 @@
+"""The commands: what they print, where, and how they exit."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import webbrowser
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+import casadi_hands
+from casadi_hands.cli import main
+from casadi_hands.cli.app import Stage, app
+from casadi_hands.design import Design
+from casadi_hands.export.mjcf import scene_mjcf
+from casadi_hands.task import load_task
+from casadi_hands.verify import Perturbation, Replay
+from tests.export.example import TASK, example_design
+from tests.verify.fixture import Scene, carried
+
+PROBLEMS = Path(__file__).parents[2] / "problems"
+
+
+@dataclass(frozen=True)
+class News:
+    stage: str
+    text: str
+    elapsed: float
+
+
+@pytest.fixture
+def task_file(tmp_path: Path) -> Path:
+    path = tmp_path / "carry.yaml"
+    path.write_text(TASK)
+    return path
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    return carried(tmp_path_factory.mktemp("task"))
+
+
+def run(*arguments: Any) -> Any:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def solve_gives(monkeypatch: pytest.MonkeyPatch, outcome: Any) -> list[dict[str, Any]]:
+    """Let solve return or raise ``outcome`` after some progress; the calls it gets."""
+    calls: list[dict[str, Any]] = []
+
+    def solve(task: Any, **settings: Any) -> Any:
+        calls.append({"task": task, **settings})
+        for stage, text, elapsed in (
+            ("floating", "first", 0.0),
+            ("floating", "too soon after the first", 1.0),
+            ("floating", "six seconds later", 6.0),
+            ("synthesis", "finger [thumb], 2 joints", 6.5),
+        ):
+            settings["progress"](News(stage, text, elapsed))
+        if isinstance(outcome, BaseException):
+            raise outcome
+        return outcome
+
+    monkeypatch.setattr(casadi_hands, "pipeline", SimpleNamespace(solve=solve), raising=False)
+    return calls
+
+
+def test_help_names_every_command() -> None:
+    text = run("--help").output
+    assert all(name in text for name in ("solve", "check", "view", "audit", "replay", "fields", "--version"))
+
+
+def test_version() -> None:
+    assert run("--version").output == f"casadi-hands {casadi_hands.__version__}\n"
+
+
+def test_nothing_heavy_is_imported_before_a_command_runs() -> None:
+    code = (
+        "import sys, casadi_hands, casadi_hands.cli.app;"
+        "print([name for name in ('casadi', 'numpy', 'pinocchio') if name in sys.modules])"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout == "[]\n"
+
+
+def test_public_names_are_what_they_say() -> None:
+    assert casadi_hands.load_task is load_task
+    assert casadi_hands.Design is Design
+    assert set(casadi_hands.__all__) <= set(dir(casadi_hands))
+    with pytest.raises(AttributeError, match="no attribute 'solv'"):
+        casadi_hands.solv  # noqa: B018
+
+
+def test_stages_are_those_of_the_pipeline() -> None:
+    from casadi_hands.pipeline import STAGES
+
+    assert tuple(Stage) == STAGES
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["check", "no.yaml"], "no.yaml: no such file"),
+        (["solve", "no.yaml"], "no.yaml: no such file"),
+        (["audit", "no-folder"], "no-folder: not a directory"),
+        (["view", "no-folder"], "no-folder: no viewer.html here"),
+    ],
+)
+def test_bad_input_is_one_message_and_exit_2(
+    arguments: list[str], message: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["casadi-hands", *arguments])
+    with pytest.raises(SystemExit) as exit_:
+        main()
+    out, err = capsys.readouterr()
+    assert (exit_.value.code, out) == (2, "")
+    assert err.startswith(f"casadi-hands: {message}")
+    assert "Traceback" not in err
+
+
+@pytest.mark.parametrize(
+    "arguments", [["solve"], ["solve", "t.yaml", "--until", "never"], ["replay", "d", "--perturb", "-1"]]
+)
+def test_wrong_arguments_exit_2(arguments: list[str]) -> None:
+    assert run(*arguments).exit_code == 2
+
+
+def test_check_says_how_a_task_is_understood() -> None:
+    text = " ".join(run("check", PROBLEMS / "pick_up_and_rotate.yaml").output.split())
+    task = load_task(PROBLEMS / "pick_up_and_rotate.yaml")
+    assert f"{task.object.mass:g} kg; 1 capsule" in text
+    assert "the program may move it" in text
+    assert f"ground at {1e3 * task.ground.height:.4g} mm" in text  # type: ignore[union-attr]
+    assert all(f"{name} touches the object at" in text for name in task.fingers)
+    assert text.count(" s: [") == len(task.motion)
+
+
+def test_check_prints_lengths_in_mm_and_principal_inertia(tmp_path: Path) -> None:
+    path = tmp_path / "ball.yaml"
+    path.write_text(
+        """
+object: {mass: 0.5, shapes: [{sphere: {center: [0, 0, 0], radius: 0.02}}]}
+palm: {radius: 0.04, position: [0, 0, 0.1], facing: [0, 0, -1]}
+motion: [{at: 0, position: [0, 0, 0]}, {at: 1.25, position: [0, 0, 0.01]}]
+fingers: {one: {touches: [0.0205, 0, 0]}}
+gravity: [0, 0, 0]
+limits: {slip: 0.005}
+"""
+    )
+    text = " ".join(run("check", path).output.split())
+    # A solid sphere has 2/5 m r² = 8e-5 kg·m²; the contact moves onto its surface.
+    for part in (
+        "[8e-05, 8e-05, 8e-05] kg·m²",
+        "40 mm at its longest",
+        "one touches the object at [20, 0, 0] mm",
+        "1.25 s: [0, 0, 10] mm, upright",
+        "1.25 s, 2 keyframes between goals",
+        "no gravity; friction 0.5; no ground",
+        "slip 0.005",
+    ):
+        assert part in text
+
+
+def test_solve_passes_its_options_on(task_file: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    calls = solve_gives(monkeypatch, example_design())
+    run("solve", task_file, "--out", tmp_path / "out", "--seed", 4, "--jobs", 2, "--until", "whole_hand")
+    call = calls[0]
+    assert call["task"] == load_task(task_file)
+    assert (call["seed"], call["jobs"], call["until"], call["out"]) == (4, 2, "whole_hand", tmp_path / "out")
+
+
+def test_solve_writes_to_results_by_default(task_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = solve_gives(monkeypatch, example_design())
+    run("solve", task_file)
+    assert (calls[0]["out"], calls[0]["seed"], calls[0]["jobs"], calls[0]["until"]) == (
+        Path("results/carry"),
+        None,
+        None,
+        "refine",
+    )
+
+
+@pytest.mark.parametrize(
+    ("status", "until", "code"),
+    [("certified", "refine", 0), ("feasible", "refine", 0), ("failed", "refine", 1), ("failed", "floating", 0)],
+)
+def test_exit_status_of_solve(
+    status: str, until: str, code: int, task_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    solve_gives(monkeypatch, replace(example_design(), status=status))
+    assert run("solve", task_file, "--until", until).exit_code == code
+
+
+def test_summary_of_a_solve(task_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    certificate = {
+        "slip": {"value": 0.0142, "limit": 0.0002, "holds": False, "unit": "m", "where": "contact 'thumb'"},
+        "spin": {"value": 7.5, "limit": None, "holds": True, "unit": "deg", "where": ""},
+    }
+    design = replace(example_design(), certificate=certificate, reason="contact 'thumb' slips [14.2 mm]")
+    solve_gives(monkeypatch, design)
+    lines = [line.split() for line in run("solve", task_file, "--out", "there").stdout.splitlines()]
+    text = "\n".join(" ".join(words) for words in lines)
+    assert ["slip", "14.2", "0.2", "mm", "missed"] in lines
+    assert ["spin", "7.5", "deg"] in lines
+    assert "move a capsule & back: feasible" in text
+    assert "joints: thumb 2, index 2, middle 2; 6 in all" in text
+    assert "contact 'thumb' slips [14.2 mm]" in text
+    assert "casadi-hands view there" in text
+
+
+def test_progress_comes_in_lines_at_a_modest_rate(task_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    solve_gives(monkeypatch, example_design())
+    lines = [" ".join(line.split()) for line in run("solve", task_file).stderr.splitlines()]
+    assert lines == [
+        "0:00 floating first",
+        "0:06 floating six seconds later",
+        "0:06 synthesis finger [thumb], 2 joints",
+    ]
+
+
+def test_interrupted_solve_says_what_is_left(task_file: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    solve_gives(monkeypatch, KeyboardInterrupt())
+    early = run("solve", task_file, "--out", tmp_path / "out")
+    assert early.exit_code == 130
+    assert "no stage was complete" in early.stderr
+    example_design().save(tmp_path / "out")
+    late = run("solve", task_file, "--out", tmp_path / "out")
+    assert late.exit_code == 130
+    assert "what was computed is in" in late.stderr
+
+
+def test_audit_holds_or_names_what_does_not(scene: Scene, tmp_path: Path) -> None:
+    good = run("audit", scene.write(tmp_path / "good"))
+    assert good.exit_code == 0, good.output
+    assert "missed" not in good.output
+    scaled = scene.moved(contact_force=1.02 * scene.motion.contact_force)
+    bad = run("audit", scaled.write(tmp_path / "bad"))
+    assert bad.exit_code == 1
+    rows = [line.split() for line in bad.output.splitlines()]
+    assert any(row[:1] == ["residual"] and row[-1] == "missed" for row in rows)
+    assert "that nothing exerts moves the object" in " ".join(bad.output.split())
+
+
+def test_audit_as_json(scene: Scene, tmp_path: Path) -> None:
+    record = json.loads(run("audit", scene.write(tmp_path / "good"), "--json").stdout)
+    assert (record["certified"], record["reasons"]) == (True, [])
+    assert record["certificate"]["slip"]["limit"] == scene.task.limits.slip
+
+
+def test_replay_prints_errors_and_drops(monkeypatch: pytest.MonkeyPatch) -> None:
+    import casadi_hands.verify
+
+    def outcome(millimetres: float, dropped: bool = False) -> Replay:
+        errors = (1e-3 * millimetres, 2e-3 * millimetres, 3e-3 * millimetres, 0.5, 0.75, 0.25)
+        return Replay(*errors, dropped, ("thumb",) if dropped else (), Perturbation())
+
+    many = [outcome(1.0), outcome(2.0), outcome(900.0, dropped=True)]
+    asked: list[tuple[Any, ...]] = []
+
+    def replay_many(*arguments: Any) -> list[Replay]:
+        asked.append(arguments)
+        return many
+
+    monkeypatch.setattr(casadi_hands.verify, "replay", lambda folder: outcome(0.5))
+    monkeypatch.setattr(casadi_hands.verify, "replay_many", replay_many)
+    found = run("replay", "folder", "--perturb", 3, "--seed", 7, "--jobs", 2)
+    rows = [" ".join(line.split()) for line in found.output.splitlines()]
+    assert asked == [(Path("folder"), 3, 7, 2)]
+    assert "as planned 0.5 1 1.5 0.5 0.75 0.25" in rows
+    assert "2 perturbed, mean 1.5 3 4.5 0.5 0.75 0.25" in rows
+    assert "2 perturbed, worst 2 4 6 0.5 0.75 0.25" in rows
+    assert "perturbed: dropped in 1 of 3" in rows
+    assert found.exit_code == 0
+    monkeypatch.setattr(casadi_hands.verify, "replay", lambda folder: outcome(50.0, dropped=True))
+    assert run("replay", "folder").exit_code == 1
+
+
+def test_replay_plays_a_folder(scene: Scene, tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    folder = scene.write(tmp_path / "good")
+    (folder / "scene.xml").write_text(scene_mjcf(scene.task, scene.hand, scene.motion))
+    found = run("replay", folder)
+    assert found.exit_code == 0, found.output
+    expected = casadi_hands.replay(folder)
+    assert f"as planned {1e3 * expected.position_mean:.3g} " in " ".join(found.output.split())
+
+
+def test_view_opens_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    example_design().save(tmp_path)
+    opened: list[str] = []
+    monkeypatch.setattr(webbrowser, "open", lambda address: opened.append(address) or True)
+    assert run("view", tmp_path).exit_code == 0
+    assert opened == [(tmp_path / "viewer.html").resolve().as_uri()]
