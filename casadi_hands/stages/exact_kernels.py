@@ -15,7 +15,7 @@ from casadi_hands.stages.hand_kernels import distances
 from casadi_hands.stages.kernels import placed
 from casadi_hands.terms import body, clearance, finger
 
-SUBSTEPS = 2  # of the integration between two knots
+SUBSTEPS = 4  # of the integration between two knots
 LEVER_DAMPING = 0.04  # half extents/rad: forces that need a shorter lever than about this count as not supplied
 _KINK = 1e-3  # smoothing of a capsule's change from cylinder to cap, relative to its length
 
@@ -73,6 +73,7 @@ def physics(contacts: int) -> Kernel:
         state = state + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
     position, quaternion = placed(states[1][0], reference)
     turned = 2 * multiply(conjugate(state[3:7]), quaternion)[1:]
+    kernel.cost("object_acceleration", (states[1][1] - states[0][1]) / step)
     kernel.constrain("defect", ca.vertcat(position - state[:3], turned, states[1][1] - state[7:]))
     return kernel
 

@@ -2,7 +2,8 @@
 
 Newton–Euler by shooting, contact on both surfaces with opposed normals, rolling without slip, friction cones with a
 margin, a floor on normal forces, forces that joints supply with a lever, clearance: all constraints. Reached by
-continuation: soft rolling and soft supply first, then rolling hard, then both.
+continuation: rolling and supply first as soft costs, then as firm ones, then as constraints. (Straight from soft to
+hard, the solver was seen to turn fingers to the object's other side.)
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from casadi_hands.stages.whole_hand import WholeHand
 
 Array = NDArray[np.float64]
 _EXACT = (("nlp_scaling_method", "none"), ("bound_push", 1e-4), ("bound_frac", 1e-4))
-SOFT = Options(max_iter=120, tol=1e-3, acceptable_tol=1e-2, constr_viol_tol=1e-6, mu_init=1e-2, extra=_EXACT)
+SOFT = Options(max_iter=80, tol=1e-3, acceptable_tol=1e-2, constr_viol_tol=1e-6, mu_init=1e-2, extra=_EXACT)
 HARD = Options(max_iter=150, tol=1e-6, acceptable_tol=1e-5, constr_viol_tol=1e-10, mu_init=1e-3, extra=_EXACT)
 CLEARANCE = 0.02  # half extents, asked of bodies that do not touch
 ACCEPTED = 1e-7  # largest violation with which a refined motion is handed on
@@ -47,15 +48,17 @@ class Margin:
 WEIGHTS = {
     "slip": 3.0,
     "passive_force": 3.0,
-    "spin": 0.03,
+    "spin": 0.1,
     "stay_point": 1.0,
     "stay_force": 0.02,
     "friction_margin": 0.02,
     "force_change": 0.5,
-    "joint_acceleration": 3e-4,
+    "joint_acceleration": 1e-3,
+    "object_acceleration": 1e-2,
     "stay_design": 0.02,
     "stay_path": 1.0,
 }
+FIRM = {"slip": 100.0, "passive_force": 30.0}
 
 
 @dataclass(frozen=True)
@@ -87,7 +90,7 @@ class RefineStage:
         self.active = active[:, list(contacts)]
         self.touching = self.active | np.vstack([np.zeros((1, len(contacts)), bool), self.active[:-1]])
         self.problem = problem = Problem()
-        count = len(model.schedule.samples)
+        self.knots = count = len(model.schedule.samples)
         self._declare(count)
         p = problem.parameters
         self._common()
@@ -173,10 +176,13 @@ class RefineStage:
         parameters = [frames, *self._scene(c, start), *self._scene(c, start + 1), p[f"helper{c}"][start], p["step"][start]]
         problem.bind(kernels.rolling(n, c), rows, parameters, {"no_slip": _FREE})
         self._bind_clearance(i, frames)
-        middle = np.arange(1, count - 1)
-        three = [angles.take(middle + offset) for offset in (-1, 0, 1)]
+        # The motion mirrored at both ends, so that joints start and end at rest.
+        knots, inner = np.arange(count), np.arange(-1, count + 1)
+        mirrored = np.where(inner < 0, 1, np.where(inner >= count, count - 2, inner))
+        three = [angles.take(mirrored[offset : offset + count]) for offset in range(3)]
         speed = model.speed_limit
-        problem.bind(kernels.joint_motion(n, c), three, [p["step"][middle]], {"speed": (-speed, speed)})
+        steps = p["step"][np.clip(knots - 1, 0, count - 2)]
+        problem.bind(kernels.joint_motion(n, c), three, [steps], {"speed": (-speed, speed)})
         own = [problem.parameter(f"wanted_{name}{c}", (1, k)) for name, k in (("base", 2), ("lengths", n), ("axes", 2 * n))]
         reach = (model.palm_radius - model.link_radius) ** 2
         problem.bind(kernels.stay(n, c), shape, own, {"on_palm": (0, reach)})
@@ -205,7 +211,7 @@ class RefineStage:
         self.problem.bind(kernel, rows, parameters, {"clear": (CLEARANCE, np.inf)})
 
     def solve(self, start: WholeHand, margin: Margin | None = None) -> Refined:
-        """Refine a whole-hand motion: soft, then rolling hard, then rolling and supply hard."""
+        """Refine a whole-hand motion: rolling and supply soft, then firm, then constraints."""
         margin = margin or Margin()
         values, parameters = self._start(start), self._parameters(start, margin)
         lower, upper = self._bounds()
@@ -217,8 +223,13 @@ class RefineStage:
         roll = {f"rolling{c}.no_slip": (0.0, 0.0) for c in self.contacts}
         supply = {f"contact{c}.passive": (-margin.passive, margin.passive) for c in self.contacts}
         runs: list[tuple[str, Solution]] = []
-        for what, hard, options in (("soft", {}, SOFT), ("rolling", roll, SOFT), ("exact", roll | supply, HARD)):
-            solution = self.solver.solve(values, parameters, options, lower, upper, pressing | hard)
+        for what, weights, hard, options in (
+            ("soft", WEIGHTS, {}, SOFT),
+            ("firm", WEIGHTS | FIRM, {}, SOFT),
+            ("exact", WEIGHTS, roll | supply, HARD),
+        ):
+            weighted = {f"weight.{term}": weights[term] / self.knots for term in self.problem.terms}
+            solution = self.solver.solve(values, parameters | weighted, options, lower, upper, pressing | hard)
             runs.append((what, solution))
             values = solution.values
         return self._result(start, runs)
@@ -286,7 +297,6 @@ class RefineStage:
             values[f"capsule{c}"] = model.capsules[c]
             values[f"wanted_point{c}"], values[f"wanted_force{c}"] = start.point[:, c], start.force[:, c]
             values[f"helper{c}"] = _helpers(start.point[:, c], model.capsules[c])
-        values |= {f"weight.{term}": WEIGHTS[term] / count for term in self.problem.terms}
         return values
 
     def _result(self, start: WholeHand, runs: list[tuple[str, Solution]]) -> Refined:
