@@ -220,8 +220,7 @@ def _goals(task: Task) -> tuple[Array, Array, Array]:
     first = pin.exp3(stated[0])
     vectors = [np.zeros(3)]
     for vector in stated[1:]:
-        axes = {tuple(np.round(v / np.linalg.norm(v), 9)) for v in (stated[0], vector) if np.linalg.norm(v) > 1e-9}
-        parallel = len({tuple(np.abs(a)) for a in axes}) <= 1
+        parallel = np.linalg.norm(np.cross(stated[0], vector)) < 1e-9
         expected = vector - stated[0] if parallel else vectors[-1]
         vectors.append(nearest_exponential(pin.exp3(vector) @ first.T, expected))
     positions = np.array([goal.position for goal in task.motion], float)
