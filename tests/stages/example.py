@@ -1,0 +1,295 @@
+"""Tasks with everything in them, made-up configurations, and the method's formulas written once more in NumPy."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from scipy.interpolate import CubicHermiteSpline
+from scipy.spatial.transform import Rotation
+
+from casadi_hands.stages.floating import Floating
+from casadi_hands.stages.model import Model, build_model
+from casadi_hands.stages.synthesis import FingerSeed
+from casadi_hands.task import Task, parse_task
+
+Array = np.ndarray
+SPLINE_WIDTH = 1e-3  # half the width of g's transition in the collision terms
+
+
+def everything_text(s: float = 1.0) -> str:
+    """A task in which every term has something to see, with lengths and gravity ``s`` times larger."""
+    return f"""
+name: everything
+object:
+  mass: 0.2
+  shapes:
+    - capsule: {{start: [0, 0, {-0.03 * s}], end: [0, {0.01 * s}, {0.03 * s}], radius: {0.015 * s}}}
+    - sphere: {{center: [{0.02 * s}, 0, {0.03 * s}], radius: {0.02 * s}}}
+palm:
+  radius: {0.05 * s}
+  position: [{0.01 * s}, {-0.02 * s}, {0.12 * s}]
+  facing: [0.1, 0.2, -1]
+  motion: [{{at: 1.2, position: [{0.02 * s}, 0, {0.13 * s}], facing: [0, 0.4, -1]}}]
+motion:
+  - {{at: 0, position: [0, 0, {0.045 * s}], rotation: {{axis: [1, 0, 0], degrees: 20}}}}
+  - {{at: 0.6, position: [{0.02 * s}, 0, {0.05 * s}], rotation: {{axis: [0, 1, 1], degrees: 70}}}}
+  - {{at: 1.5, position: [0, {0.03 * s}, {0.06 * s}], rotation: {{axis: [0, 0, 1], degrees: -40}}}}
+fingers:
+  thumb: {{touches: [{0.015 * s}, 0, {-0.01 * s}]}}
+  index: {{touches: [{-0.015 * s}, 0, 0]}}
+  top: {{touches: [{0.03 * s}, 0, {0.047 * s}]}}
+friction: 0.6
+gravity: [0, 0, {-9.81 * s}]
+ground: {{height: {0.001 * s}, friction: 0.4}}
+perturbations:
+  - {{from: 0.3, to: 0.9, force: [{0.3 * s}, 0, {-0.5 * s}], torque: [0, {0.004 * s * s}, 0]}}
+  - {{from: 0.5, to: 0.7, force: [0, {0.2 * s}, 0]}}
+hand: {{link_radius: {0.006 * s}, link_length: [{0.012 * s}, {0.1 * s}], joint_limits: [-80, 85]}}
+actuator: {{torque: {0.05 * s * s}, speed: 6}}
+keyframes_between: 1
+"""
+
+
+DRAWING = """
+object: {mass: 0.02, shapes: [{capsule: {start: [0, 0, -0.05], end: [0, 0, 0.05], radius: 0.005}}]}
+palm: {radius: 0.05, position: [0, 0, 0.2], facing: [0, 0, -1]}
+tool: [0, 0.001, -0.055]
+motion:
+  - {at: 0, tool_at: [0, 0, 0]}
+  - {at: 0.7, tool_at: [0.04, 0, 0]}
+  - {at: 1.5, tool_at: [0.04, 0.03, 0.01]}
+fingers: {thumb: {touches: [0.005, 0, 0]}, index: {touches: [-0.005, 0, 0]}}
+"""
+
+
+def everything() -> tuple[Task, Model]:
+    task = parse_task(everything_text())
+    return task, build_model(task)
+
+
+def drawing() -> tuple[Task, Model]:
+    task = parse_task(DRAWING)
+    return task, build_model(task)
+
+
+def made_up_values(model: Model, seed: int = 0) -> dict[str, Array]:
+    """Poses off their goals, contacts off their surfaces, forces in and out of their cones, flags between 0 and 1."""
+    rng = np.random.default_rng(seed)
+    keyframes, samples = len(model.schedule.keyframes), len(model.schedule.samples)
+    contacts = model.contacts + (model.ground is not None)
+    patches = model.patches if model.ground is None else np.vstack([model.patches, model.ground.patch])
+    return {
+        "pose": np.hstack([rng.uniform(-0.6, 0.9, (keyframes, 3)), rng.uniform(-1.2, 1.2, (keyframes, 3))]),
+        "point": (patches + 0.1 * rng.normal(size=(keyframes, contacts, 3))).reshape(keyframes, -1),
+        "force": rng.normal(size=(samples, 3 * contacts)),
+        "activity": rng.uniform(0.1, 0.9, (keyframes, contacts)),
+        **({"force_perturbed": rng.normal(size=(samples, 3 * contacts))} if model.perturbed else {}),
+    }
+
+
+def made_up_floating(model: Model, seed: int = 0) -> Floating:
+    """The same with flags of 0 and 1; every finger lifts once, away from the ends."""
+    values = made_up_values(model, seed)
+    keyframes, contacts = values["activity"].shape
+    active = np.ones((keyframes, contacts), bool)
+    for c in range(contacts):
+        active[1 + c % (keyframes - 2), c] = False
+    return Floating(
+        pose=values["pose"],
+        point=values["point"].reshape(keyframes, contacts, 3),
+        force=values["force"].reshape(-1, contacts, 3),
+        active=active,
+        activity=values["activity"],
+        threshold=0.2,
+        runs=(),
+    )
+
+
+def made_up_finger(model: Model, joints: int, strings: int, seed: int, bend: float = 0.8) -> FingerSeed:
+    rng = np.random.default_rng((joints, seed))
+    return FingerSeed(
+        base=rng.uniform(-0.8, 0.8, 2),
+        lengths=rng.uniform(0.4, 1.2, joints),
+        frames=Rotation.random(joints, rng=rng).as_matrix(),
+        axes=rng.uniform(-0.7, 0.7, (joints, 2)),
+        angles=rng.uniform(-bend, bend, (len(model.schedule.keyframes), joints)),
+        tips=rng.uniform(-0.25, 0.25, (strings, 2)),
+    )
+
+
+def spline_at(knots: Array, values: Array, times: Array) -> Array:
+    """Catmull–Rom as SciPy's Hermite spline; times beyond the ends see the mirror image."""
+    slopes = np.zeros_like(values)
+    slopes[1:-1] = (values[2:] - values[:-2]) / (knots[2:] - knots[:-2])[:, None]
+    mirrored = np.abs(times - knots[0]) + knots[0]
+    mirrored = knots[-1] - np.abs(knots[-1] - mirrored)
+    return CubicHermiteSpline(knots, values, slopes)(mirrored)
+
+
+def linear_at(knots: Array, values: Array, times: Array) -> Array:
+    return np.column_stack([np.interp(times, knots, column) for column in values.T])
+
+
+def g(x: Array) -> Array:
+    """The penalty of 2.2.2 with its transition at ±1e-3."""
+    e = SPLINE_WIDTH
+    return np.where(x < -e, 0, np.where(x < e, x**3 / (6 * e) + x**2 / 2 + e * x / 2 + e**2 / 6, x**2 + e**2 / 3))
+
+
+def cone(force: Array, inward: Array, friction: float, sharpness: float = 5.0) -> float:
+    """exp(α(‖f_t‖ - μ f_n)), continued quadratically above 10."""
+    pressing = force @ inward
+    x = sharpness * (np.linalg.norm(force - pressing * inward) - friction * pressing)
+    above = max(x - 10, 0)
+    return float(np.exp(min(x, 10)) * (1 + above + above**2 / 2))
+
+
+def nearest_on_axis(point: Array, capsule: Array) -> Array:
+    start, along = capsule[:3], capsule[3:6] - capsule[:3]
+    length = along @ along
+    return start + (np.clip((point - start) @ along / length, 0, 1) if length else 0.0) * along
+
+
+def project(point: Array, capsule: Array) -> tuple[Array, Array]:
+    """Nearest surface point and outward normal."""
+    outward = point - nearest_on_axis(point, capsule)
+    normal = outward / np.linalg.norm(outward)
+    return nearest_on_axis(point, capsule) + capsule[6] * normal, normal
+
+
+def segments_apart(a: Array, b: Array, c: Array, d: Array) -> float:
+    """Distance of two segments: the best of the inner solution and the four ends' projections."""
+    u, v, w = b - a, d - c, a - c
+    ends = [
+        np.linalg.norm(p - nearest_on_axis(p, np.r_[q, r, 0]))
+        for p, q, r in ((a, c, d), (b, c, d), (c, a, b), (d, a, b))
+    ]
+    matrix = np.array([[u @ u, -u @ v], [-u @ v, v @ v]])
+    if np.linalg.det(matrix) > 1e-12:
+        s, t = np.linalg.solve(matrix, [-u @ w, v @ w])
+        if 0 <= s <= 1 and 0 <= t <= 1:
+            ends.append(np.linalg.norm(w + s * u - t * v))
+    return float(min(ends))
+
+
+def palm_apart(point: Array, radius: float) -> float:
+    """Signed distance of a point from a disc's body, which fills z < 0 below it."""
+    height, beyond = point[2], np.hypot(point[0], point[1]) - radius
+    if height <= 0 and beyond <= 0:
+        return max(height, beyond)
+    return float(np.hypot(max(height, 0), max(beyond, 0)))
+
+
+def quaternion_product(a: Array, b: Array) -> Array:
+    w, v = a[0], a[1:]
+    return np.r_[w * b[0] - v @ b[1:], w * b[1:] + b[0] * v + np.cross(v, b[1:])]
+
+
+@dataclass
+class Motion:
+    """The object at every sample, from SciPy's splines and rotations."""
+
+    model: Model
+    pose: Array
+
+    def at(self, steps: int) -> tuple[Array, list[Rotation]]:
+        """Positions and orientations ``steps`` time steps after the samples."""
+        schedule = self.model.schedule
+        poses = spline_at(schedule.keyframes, self.pose, schedule.samples + steps * schedule.step)
+        reference = Rotation.from_quat(self.model.reference, scalar_first=True)
+        return poses[:, :3], [Rotation.from_rotvec(v) * reference for v in poses[:, 3:]]
+
+    @property
+    def acceleration(self) -> Array:
+        before, now, after = (self.at(k)[0] for k in (-1, 0, 1))
+        return (after - 2 * now + before) / self.model.schedule.step**2
+
+    @property
+    def inertial_torque(self) -> Array:
+        """ω×Iω + Iω̇ with 2 Im(q* q̇) and 2 Im(q* q̈), in m·g·length."""
+        h, torques = self.model.schedule.step, []
+        for before, now, after in zip(*(self.at(k)[1] for k in (-1, 0, 1)), strict=True):
+            q = now.as_quat(scalar_first=True)
+            p, r = (o.as_quat(scalar_first=True) for o in (before, after))
+            p, r = p * np.sign(p @ q), r * np.sign(r @ q)
+            inverse = q * np.array([1, -1, -1, -1])
+            omega = 2 * quaternion_product(inverse, (r - p) / (2 * h))[1:]
+            alpha = 2 * quaternion_product(inverse, (r - 2 * q + p) / h**2)[1:]
+            inertia = self.model.inertia
+            torques.append(np.cross(omega, inertia @ omega) + inertia @ alpha)
+        return self.model.units.inertial * np.array(torques)
+
+
+@dataclass
+class PinFinger:
+    """A finger in numeric Pinocchio, palm frame."""
+
+    seed: FingerSeed
+
+    @property
+    def axes(self) -> Array:
+        """The seed frames' third columns turned by the exponential coordinates, with SciPy."""
+        turned = []
+        for frame, (x, y) in zip(self.seed.frames, self.seed.axes, strict=True):
+            # The axis leans towards (x, y): a turn about (-y, x).
+            turned.append(frame @ Rotation.from_rotvec([-y, x, 0]).apply([0, 0, 1]))
+        return np.array(turned)
+
+    def chain(self, angles: Array) -> tuple[Array, Array]:
+        """Joint origins and tip (n + 1, 3), and the rotation of the last link."""
+        rotation, points = np.eye(3), [np.append(self.seed.base, 0.0)]
+        for axis, length, angle in zip(self.axes, self.seed.lengths, angles, strict=True):
+            rotation = rotation @ pin.exp3(angle * axis)
+            points.append(points[-1] + length * rotation[:, 2])
+        return np.array(points), rotation
+
+    def links(self, angles: Array) -> list[tuple[Array, Array]]:
+        return list(itertools.pairwise(self.chain(angles)[0]))
+
+    def jacobian(self, angles: Array, on_link: Array) -> Array:
+        """(3, n) of a point of the last link, by central differences of Rodrigues' formula."""
+        h = 1e-6
+        return np.column_stack(
+            [
+                (self.point(angles + h * e, on_link) - self.point(angles - h * e, on_link)) / (2 * h)
+                for e in np.eye(len(angles))
+            ]
+        )
+
+    def point(self, angles: Array, on_link: Array) -> Array:
+        points, rotation = self.chain(angles)
+        return points[-2] + rotation @ on_link
+
+
+def unsupplied(jacobian: Array, force: Array, damping: float = 0.02) -> float:
+    """Size of what no joint supplies, by SVD: a singular value s supplies a share s² / (s² + λ²)."""
+    left, singular, _ = np.linalg.svd(jacobian)
+    shares = np.zeros(3)
+    shares[: len(singular)] = singular**2 / (singular**2 + damping**2)
+    rest = (1 - shares) * (left.T @ force)
+    return float(np.sqrt(rest @ rest + 1e-4))
+
+
+def torques(jacobian: Array, force: Array) -> Array:
+    """α of eq. A.5 by damped least squares on X = J / ‖J_i‖²."""
+    x = jacobian / (jacobian**2).sum(axis=0)
+    return np.linalg.lstsq(np.vstack([x, 1e-3 * np.eye(x.shape[1])]), np.r_[force, np.zeros(x.shape[1])], rcond=None)[0]
+
+
+def doubling_each_weight(
+    evaluate: Callable[[Mapping[str, object]], dict[str, float]], weights: Mapping[str, object]
+) -> dict[str, set[str]]:
+    """For each weight the terms whose value doubles when it does; every other term must stay the same."""
+    plain, moved = evaluate(weights), {}
+    for name, weight in weights.items():
+        twice = tuple(2 * w for w in weight) if isinstance(weight, tuple) else 2 * weight  # type: ignore[operator]
+        changed = evaluate({**weights, name: twice})
+        doubled = {term for term in plain if not np.isclose(changed[term], plain[term], rtol=1e-12, atol=0)}
+        for term in doubled:
+            np.testing.assert_allclose(changed[term], 2 * plain[term], rtol=1e-12)
+        moved[name] = doubled
+    return moved
