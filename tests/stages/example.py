@@ -11,6 +11,7 @@ import pinocchio as pin
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
+from casadi_hands.nlp import Solver
 from casadi_hands.stages.floating import Floating
 from casadi_hands.stages.model import Model, build_model
 from casadi_hands.stages.synthesis import FingerSeed
@@ -293,3 +294,27 @@ def doubling_each_weight(
             np.testing.assert_allclose(changed[term], 2 * plain[term], rtol=1e-12)
         moved[name] = doubled
     return moved
+
+
+def check_derivatives(solver: Solver, values: Mapping[str, Array], parameters: Mapping[str, object]) -> None:
+    """Gradient, Jacobian and Hessian of a whole problem against central differences along random directions."""
+    problem, functions, h = solver.problem, solver.functions, 1e-6
+    x = problem.variables.pack(values, np.zeros(problem.variables.size))
+    p = problem.parameters.pack(parameters, np.zeros(problem.parameters.size))  # type: ignore[arg-type]
+    rng = np.random.default_rng(0)
+    multipliers = rng.normal(size=problem.constraints.size)
+
+    def lagrangian_gradient(at: Array) -> Array:
+        gradient = np.asarray(functions["grad_f"](at, p)[1]).ravel()
+        return gradient + np.asarray(functions["jac_g"](at, p)[1]).T @ multipliers
+
+    gradient = np.asarray(functions["grad_f"](x, p)[1]).ravel()
+    upper = np.asarray(functions["hess_lag"](x, p, 1.0, multipliers))
+    hessian = upper + np.triu(upper, 1).T
+    for _ in range(5):
+        way = rng.normal(size=x.size)
+        ahead, behind = (functions["nlp"](x + s * h * way, p) for s in (1, -1))
+        slope = (float(ahead[0]) - float(behind[0])) / (2 * h)
+        assert abs(slope - gradient @ way) < 1e-5 * np.linalg.norm(gradient) * np.linalg.norm(way)
+        bent = (lagrangian_gradient(x + h * way) - lagrangian_gradient(x - h * way)) / (2 * h)
+        assert np.abs(bent - hessian @ way).max() < 1e-3 * np.abs(bent).max()

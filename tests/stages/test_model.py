@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 from scipy.spatial.transform import Rotation, Slerp
-from tests.stages.example import drawing, everything, everything_text
 
 from casadi_hands.stages.floating import FloatingStage
 from casadi_hands.stages.model import Model, build_model
 from casadi_hands.task import parse_task
+from tests.stages.example import drawing, everything, everything_text
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 LENGTHS = {"start", "end", "center", "radius", "position", "touches", "gravity"}
