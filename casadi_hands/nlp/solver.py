@@ -48,6 +48,7 @@ class Solution:
         objective: sum of the terms.
         violation: largest violation of a constraint.
         violations: ``kernel.constraint`` -> its largest violation.
+        constraints: ``kernel.constraint`` -> its values, one row an instance.
         status: IPOPT's own words; never taken as proof.
         iterations: number of iterations.
         seconds: wall time.
@@ -59,6 +60,7 @@ class Solution:
     objective: float
     violation: float
     violations: dict[str, float]
+    constraints: dict[str, Vector] = field(repr=False)
     status: str
     iterations: int
     seconds: float
@@ -154,6 +156,7 @@ class Solver:
             objective=float(answer["f"]),
             violation=float(max(beyond.max(initial=0.0), 0.0)),
             violations={name: float(max(beyond[rows].max(initial=0.0), 0.0)) for name, rows in problem.constraint_rows.items()},
+            constraints={name: g[rows] for name, rows in problem.constraint_rows.items()},
             status=str(stats["return_status"]),
             iterations=int(stats["iter_count"]),
             seconds=seconds,

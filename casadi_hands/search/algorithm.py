@@ -43,12 +43,10 @@ class Found:
 
     Attributes:
         candidates: hands of the last round, best objective first.
-        runs: one record for each trial and recombination, for ``result.json``.
         short: names of contacts whose finger stayed above the threshold at the most joints allowed.
     """
 
     candidates: tuple[Candidate, ...]
-    runs: tuple[dict[str, Any], ...]
     short: tuple[str, ...]
 
 
@@ -98,7 +96,7 @@ class Search:
             growing = {c for c in self.contacts if joints[c] < self.max_joints and scores[c] >= self.threshold}
             if not growing:
                 short = tuple(self.names[c] for c in self.contacts if scores[c] >= self.threshold)
-                return Found(tuple(candidates), tuple(self.runs), short)
+                return Found(tuple(candidates), short)
             for c in growing:
                 joints[c] += 1
 
@@ -150,6 +148,11 @@ class Search:
             candidates.append(Candidate(result, scores, trial))
             self._record(f"hand of {'+'.join(str(f.joints) for f in result.fingers)} joints", trial, result)
         return sorted(candidates, key=lambda candidate: candidate.hand.solution.objective)
+
+    def take_runs(self) -> list[dict[str, Any]]:
+        """Records of the solves since the last call, for ``stages`` of result.json."""
+        runs, self.runs = self.runs, []
+        return runs
 
     def _record(self, what: str, trial: int, result: Synthesised) -> None:
         for step, solution in result.runs:

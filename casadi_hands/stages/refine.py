@@ -27,6 +27,7 @@ SOFT = Options(max_iter=80, tol=1e-3, acceptable_tol=1e-2, constr_viol_tol=1e-6,
 HARD = Options(max_iter=150, tol=1e-6, acceptable_tol=1e-5, constr_viol_tol=1e-10, mu_init=1e-3, extra=_EXACT)
 CLEARANCE = 0.02  # half extents, asked of bodies that do not touch
 ACCEPTED = 1e-7  # largest violation with which a refined motion is handed on
+HOPELESS = 0.3  # half extents of slip that a firm solve leaves when rolling is out of a structure's reach
 _FREE = (-np.inf, np.inf)
 
 
@@ -68,16 +69,16 @@ class Refined:
     Attributes:
         hand: as the whole-hand stage's, with the design as it is now.
         exact: whether every constraint is met within ``ACCEPTED``.
-        rolls: whether rolling was a constraint in the end.
         worst: (constraint, violation) of the last solve.
+        slips: for each contact the slip that its last soft solve was left with, half extents.
         moved: for each contact how far base and lengths moved, half extents, and axes turned, rad.
         runs: every solve: (what, solution).
     """
 
     hand: WholeHand
     exact: bool
-    rolls: bool
     worst: tuple[str, float]
+    slips: dict[str, float]
     moved: dict[str, dict[str, float]]
     runs: tuple[tuple[str, Solution], ...]
 
@@ -232,7 +233,18 @@ class RefineStage:
             solution = self.solver.solve(values, parameters | weighted, options, lower, upper, pressing | hard)
             runs.append((what, solution))
             values = solution.values
-        return self._result(start, runs)
+            if what == "firm":
+                slips = self._slips(solution)
+                if max(slips.values()) > HOPELESS:
+                    break
+        return self._result(start, runs, slips)
+
+    def _slips(self, solution: Solution) -> dict[str, float]:
+        """Path length of each contact's slip."""
+        return {
+            self.model.contact_names[c]: float(np.linalg.norm(solution.constraints[f"rolling{c}.no_slip"], axis=1).sum())
+            for c in self.contacts
+        }
 
     def _bounds(self) -> tuple[dict[str, Array], dict[str, Array]]:
         """Goals as bounds, rest at both ends, no force where there is no contact."""
@@ -299,7 +311,7 @@ class RefineStage:
             values[f"helper{c}"] = _helpers(start.point[:, c], model.capsules[c])
         return values
 
-    def _result(self, start: WholeHand, runs: list[tuple[str, Solution]]) -> Refined:
+    def _result(self, start: WholeHand, runs: list[tuple[str, Solution]], slips: dict[str, float]) -> Refined:
         solution = runs[-1][1]
         values, count = solution.values, len(self.model.schedule.samples)
         point, force = start.point.copy(), start.force.copy()
@@ -332,7 +344,8 @@ class RefineStage:
             solution=solution,
         )
         worst = max(solution.violations.items(), key=lambda item: item[1])
-        return Refined(hand, worst[1] <= ACCEPTED, True, worst, moved, tuple(runs))
+        exact = runs[-1][0] == "exact" and worst[1] <= ACCEPTED
+        return Refined(hand, exact, worst, slips, moved, tuple(runs))
 
 
 def _helpers(points: Array, capsule: Array) -> Array:

@@ -1,0 +1,283 @@
+"""From a task to a design: the stages in order, with everything computed kept as it comes."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from casadi_hands.design import Design
+from casadi_hands.errors import SolveError
+from casadi_hands.nlp import Solution
+from casadi_hands.search.algorithm import Candidate, Found, Search, run_record
+from casadi_hands.search.work import processes
+from casadi_hands.stages.floating import Floating, FloatingStage
+from casadi_hands.stages.model import Model, build_model
+from casadi_hands.stages.outcome import floating_motion, hand_of, joint_loads, whole_hand_motion
+from casadi_hands.stages.refine import Refined, RefineStage
+from casadi_hands.stages.target import target_of
+from casadi_hands.stages.whole_hand import WholeHand, WholeHandStage
+from casadi_hands.task import Task
+from casadi_hands.verify import Audit, audit
+
+STAGES = ("floating", "synthesis", "whole_hand", "refine")
+HANDS_REFINED = 2  # hands of one structure that are tried before fingers get another joint
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What a solve is doing.
+
+    Attributes:
+        stage: one of ``STAGES``.
+        text: what is tried, and the best so far.
+        elapsed: s since the solve began.
+    """
+
+    stage: str
+    text: str
+    elapsed: float
+
+
+def solve(
+    task: Task,
+    *,
+    seed: int | None = None,
+    jobs: int | None = None,
+    until: str = "refine",
+    out: Path | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> Design:
+    """Design a hand for a task.
+
+    Args:
+        task: as ``load_task`` gives it.
+        seed: of the search, in place of the task's.
+        jobs: processes for the trials; all cores by default. The design does not depend on it.
+        until: the last stage to run.
+        out: folder that is written after every stage, so that nothing computed is lost.
+        progress: told what is being done.
+
+    Returns:
+        The design; its status is earned by the audit of what is written.
+
+    Raises:
+        SolveError: ``until`` is not a stage.
+    """
+    if until not in STAGES:
+        raise SolveError(f"until: given {until!r}; allowed: {', '.join(STAGES)}")
+    if seed is not None:
+        task = task.model_copy(update={"search": task.search.model_copy(update={"seed": seed})})
+    with processes(jobs) as executor:
+        return _Run(task, until, out, progress or (lambda _: None), executor).run()
+
+
+class _Run:
+    """The state of one solve."""
+
+    def __init__(
+        self,
+        task: Task,
+        until: str,
+        out: Path | None,
+        progress: Callable[[Progress], None],
+        executor: Executor | None,
+    ) -> None:
+        self.task, self.until, self.out = task, until, out
+        self.report, self.executor = progress, executor
+        self.model: Model = build_model(task)
+        self.started = time.perf_counter()
+        self.design = Design(task=task, status="failed", reason="nothing has been computed yet")
+
+    def run(self) -> Design:
+        """All stages, to the last one asked for."""
+        floating = self._floating()
+        if self.until == "floating":
+            return self._keep(self._stopped("floating"))
+        search = self._search(floating)
+        found = search.run()
+        self._record_search(search, found)
+        if self.until == "synthesis":
+            return self._keep(self._stopped("synthesis"))
+        if self.until == "whole_hand":
+            self._whole_hand(floating, found.candidates[0])
+            return self._keep(self._judge(self.design, _short_of(found)))
+        return self._keep(self._refine(floating, search, found))
+
+    # What each stage does.
+
+    def _floating(self) -> Floating:
+        with self._stage("floating", f"object's motion with {self.model.contacts} floating contacts"):
+            result = FloatingStage(self.model).solve(self.task.weights.floating)
+        runs = [run_record("floating", what, self.task.search.seed, what, s) for what, s in result.runs[:-1]]
+        self._extend(runs, "floating", result.solution, self.task.weights.floating)
+        self.design = replace(self.design, motion=floating_motion(self.model, result))
+        self._keep(replace(self.design, reason="stopped before a hand was designed"))
+        return result
+
+    def _search(self, floating: Floating) -> Search:
+        settings = self.task.search
+        return Search(
+            target_of(self.model, floating),
+            dict(self.task.weights.synthesis),
+            trials=settings.trials,
+            recombinations=settings.recombinations,
+            max_joints=settings.max_joints,
+            threshold=settings.threshold,
+            seed=settings.seed,
+            executor=self.executor,
+            progress=lambda text: self._say("synthesis", text),
+        )
+
+    def _record_search(self, search: Search, found: Found) -> None:
+        best = found.candidates[0]
+        self._extend(search.take_runs(), "synthesis", best.hand.solution, self.task.weights.synthesis)
+        hand = hand_of(self.task, self.model, best.hand.fingers, best.hand.contacts, 1.0, 1.0)
+        self.design = replace(self.design, hand=hand, motion=None)
+        joints = "+".join(map(str, best.joints))
+        self._say("synthesis", f"best hand has {joints} joints, scores {', '.join(f'{s:.3f}' for s in best.scores)}")
+
+    def _whole_hand(self, floating: Floating, candidate: Candidate) -> WholeHand:
+        with self._stage("whole_hand", f"object and hand of {'+'.join(map(str, candidate.joints))} joints together"):
+            stage = WholeHandStage(self.model, candidate.hand.contacts, candidate.joints, self.task.palm.may_move)
+            result = stage.solve(floating, candidate.hand.fingers, self.task.weights.whole_hand)
+        runs = [run_record("whole_hand", "hand", self.task.search.seed, "", result.solution)]
+        self._extend(runs, "whole_hand", result.solution, self.task.weights.whole_hand)
+        self._adopt(result)
+        self._keep(replace(self.design, reason="stopped before the motion was refined"))
+        return result
+
+    def _refine(self, floating: Floating, search: Search, found: Found) -> Design:
+        """Refine hands until one is certified: the best, the next best, then with one more joint where it fails."""
+        best: tuple[int, Design] | None = None
+        while True:
+            failing: set[str] = set()
+            for candidate in found.candidates[:HANDS_REFINED]:
+                whole = self._whole_hand(floating, candidate)
+                refined = self._exact(whole)
+                self._adopt(refined.hand)
+                judged = self._judge(self.design, _reason(self.model, refined))
+                missed = sum(not figure["holds"] for figure in judged.certificate.values())
+                if judged.status == "certified":
+                    return judged
+                if best is None or missed < best[0]:
+                    best = (missed, judged)
+                failing |= _failing(self.model, refined)
+                if max(refined.slips.values()) > 0.0 and refined.runs[-1][0] == "firm":
+                    break  # a structure that must slip will do so in any of its hands
+            least = self._more_joints(search, found, failing)
+            if least is None:
+                return best[1]
+            self._say("synthesis", f"not certified yet; another joint for {', '.join(sorted(failing))}")
+            found = search.run(least)
+            self._record_search(search, found)
+
+    def _exact(self, whole: WholeHand) -> Refined:
+        with self._stage("refine", "the same motion with exact physics, rolling contacts and clearance"):
+            joints = tuple(finger.joints for finger in whole.fingers)
+            result = RefineStage(self.model, whole.contacts, joints, whole.active).solve(whole)
+        runs = [run_record("refine", "hand", self.task.search.seed, what, s) for what, s in result.runs]
+        self.design = replace(self.design, stages=[*self.design.stages, *runs])
+        terms = result.runs[-1][1].terms
+        costs = {name: {"weight": 1.0, "value": value} for name, value in terms.items()}
+        self.design = replace(self.design, costs={**self.design.costs, "refine": costs})
+        return result
+
+    def _more_joints(self, search: Search, found: Found, failing: set[str]) -> dict[int, int] | None:
+        """Joints of each finger for the next round; None when no failing finger may have more."""
+        best = found.candidates[0]
+        joints = dict(zip(best.hand.contacts, best.joints, strict=True))
+        chosen = [c for c in joints if self.model.contact_names[c] in failing] or list(joints)
+        chosen = [c for c in chosen if joints[c] < search.max_joints]
+        if not chosen:
+            return None
+        fewest = min(joints[c] for c in chosen)
+        return {c: n + (c in chosen and n == fewest) for c, n in joints.items()}
+
+    # What is kept.
+
+    def _adopt(self, result: WholeHand) -> None:
+        torque, speed = joint_loads(self.model, result)
+        hand = hand_of(self.task, self.model, result.fingers, result.contacts, torque, speed)
+        self.design = replace(self.design, hand=hand, motion=whole_hand_motion(self.model, result))
+
+    def _judge(self, design: Design, reason: str) -> Design:
+        """The design with the audit's certificate and the status it earns."""
+        with tempfile.TemporaryDirectory() as scratch:
+            design.save(scratch)
+            verdict: Audit = audit(scratch)
+        certificate = verdict.as_certificate()
+        if verdict.certified:
+            return replace(design, status="certified", reason="", certificate=certificate)
+        text = "; ".join([*([reason] if reason else []), *verdict.reasons])
+        return replace(design, status="feasible", reason=text, certificate=certificate)
+
+    def _stopped(self, stage: str) -> Design:
+        return replace(self.design, status="feasible", reason=f"stopped after the stage {stage}, as asked")
+
+    def _keep(self, design: Design) -> Design:
+        """Write what there is, if there is a place for it."""
+        seconds = {**design.seconds, "total": time.perf_counter() - self.started}
+        design = replace(design, seconds=seconds)
+        if self.out is not None:
+            design.save(self.out)
+        return design
+
+    def _extend(self, runs: list[dict[str, Any]], stage: str, solution: Solution, weights: Mapping[str, Any]) -> None:
+        """Add a stage's runs and its terms' weights and weighted values."""
+        costs = {}
+        for name, value in solution.terms.items():
+            weight = dict(weights).get(name.removesuffix("_perturbed"), 0.0)
+            weight = weight[-1] if isinstance(weight, tuple | list) else weight
+            costs[name] = {"weight": float(weight), "value": value}
+        all_costs = {**self.design.costs, stage: costs}
+        self.design = replace(self.design, costs=all_costs, stages=[*self.design.stages, *runs])
+
+    def _say(self, stage: str, text: str) -> None:
+        self.report(Progress(stage, text, time.perf_counter() - self.started))
+
+    @contextmanager
+    def _stage(self, name: str, text: str) -> Iterator[None]:
+        """Announce a stage and add its time to the design's."""
+        self._say(name, text)
+        began = time.perf_counter()
+        yield
+        seconds = dict(self.design.seconds)
+        seconds[name] = seconds.get(name, 0.0) + time.perf_counter() - began
+        self.design = replace(self.design, seconds=seconds)
+
+
+def _short_of(found: Found) -> str:
+    """Why fingers of the search still miss their contacts, if some do."""
+    if not found.short:
+        return ""
+    return f"finger(s) {', '.join(found.short)} cannot follow their contact within {max(found.candidates[0].joints)} joints"
+
+
+def _failing(model: Model, refined: Refined) -> set[str]:
+    """Names of the fingers that kept a motion from being exact; none if it cannot be laid to fingers."""
+    if refined.runs[-1][0] == "firm":
+        most = max(refined.slips.values())
+        return {name for name, slip in refined.slips.items() if slip > 0.3 * most}
+    kernel = refined.worst[0].split(".")[0]
+    digits = "".join(ch for ch in kernel if ch.isdigit())
+    return {model.contact_names[int(digits)]} if digits.isdigit() and int(digits) < model.contacts else set()
+
+
+def _reason(model: Model, refined: Refined) -> str:
+    """Why a refined motion is not exact, in the user's terms; empty if it is."""
+    if refined.exact:
+        return ""
+    joints = {model.contact_names[c]: f.joints for c, f in zip(refined.hand.contacts, refined.hand.fingers, strict=True)}
+    if refined.runs[-1][0] == "firm":
+        worst = max(refined.slips, key=lambda name: refined.slips[name])
+        slip = refined.slips[worst] * model.units.length * 1e3
+        return f"finger '{worst}' with {joints[worst]} joint(s) cannot roll with the object: it slips {slip:.1f} mm"
+    constraint, violation = refined.worst
+    return f"the motion could not be made exact: {constraint} is still violated by {violation:.2g}"
+
