@@ -76,31 +76,33 @@ def solve(
 ) -> None:
     """Design a hand for a task.
 
-    Exits 0 when there is a design that does the task (and after --until), 1 when there is none, 2 when the task
-    cannot be used. What has been computed is written after every stage, so stopping it (Ctrl-C) loses little.
+    Exits 0 when there is a design that does the task (or all that --until asked for), 1 when there is none, 2 when
+    the task cannot be used. What has been computed is written after every stage, so stopping it (Ctrl-C) loses little.
     """
+    from casadi_hands.cli.interrupt import leave_on_interrupt
     from casadi_hands.cli.progress import Reporter
     from casadi_hands.cli.summary import design_summary
     from casadi_hands.task import load_task
 
     problem = load_task(task)
     folder = out or Path("results") / task.stem
-    with Reporter(Console(stderr=True)) as reporter:
+    reporter = Reporter(Console(stderr=True))
+
+    def stopped() -> None:
+        reporter.stop()
+        # Written last, so a folder that has it is complete.
+        complete = (folder / "result.json").is_file()
+        reporter.note(f"stopped; {f'what was computed is in {folder}' if complete else 'no stage was complete'}")
+
+    with leave_on_interrupt(stopped), reporter:
         # Within the reporter, because CasADi and Pinocchio take seconds to load.
         from casadi_hands import pipeline
 
-        try:
-            design = pipeline.solve(
-                problem, seed=seed, jobs=jobs, until=until.value, out=folder, progress=reporter.progress
-            )
-        except KeyboardInterrupt:
-            kept = (
-                f"what was computed is in {folder}" if (folder / "result.json").is_file() else "no stage was complete"
-            )
-            reporter.note(f"stopped; {kept}")
-            raise typer.Exit(130) from None
+        design = pipeline.solve(
+            problem, seed=seed, jobs=jobs, until=until.value, out=folder, progress=reporter.progress
+        )
     Console().print(design_summary(design, folder))
-    raise typer.Exit(1 if design.status == "failed" and until is Stage.REFINE else 0)
+    raise typer.Exit(1 if design.status == "failed" else 0)
 
 
 @app.command()

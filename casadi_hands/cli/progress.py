@@ -39,6 +39,10 @@ class Reporter:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Give the terminal back."""
+        self.stop()
+
+    def stop(self) -> None:
+        """End the moving line."""
         self._live.stop()
 
     def __rich__(self) -> Spinner:
