@@ -82,7 +82,8 @@ class Witness:
         arc, radius = np.linalg.norm(coordinates), self.model.link_radius
         angle = min(arc / radius, np.pi / 2)
         side = np.append(coordinates / arc, 0) * radius * np.sin(angle)
-        return side + [0, 0, seed.lengths[-1] + radius * np.cos(angle) - max(arc - radius * np.pi / 2, 0)]
+        along = seed.lengths[-1] + radius * np.cos(angle) - max(arc - radius * np.pi / 2, 0)
+        return np.append(side[:2], along)
 
     def build(self, total: dict[str, float], seed: FingerSeed) -> None:
         shortest, longest = self.model.link_length
@@ -107,7 +108,7 @@ class Witness:
         for t in range(len(self.collision_times)):
             links = [finger.links(a[t]) for finger, a in zip(self.pins, angles, strict=True)]
             for chain in links:
-                points = [chain[0][1]] + [p for a, b in chain[1:] for p in ((a + b) / 2, b)]
+                points = [chain[0][1], *(p for a, b in chain[1:] for p in ((a + b) / 2, b))]
                 apart = [palm_apart(p, model.palm_radius) - radius for p in points]
                 apart += [up[t] @ p - ground[t] - radius for p in (chain[0][0], *(b for _, b in chain))]
                 apart += [
