@@ -123,3 +123,14 @@ def test_an_iteration_cap_ends_with_a_value() -> None:
     assert stopped.status == "Maximum_Iterations_Exceeded"
     assert stopped.iterations == 1
     assert np.isfinite(stopped.values["points"]).all()
+
+
+def test_constraints_by_name_and_with_other_bounds(solution: Solution) -> None:
+    radii = (solution.values["points"] ** 2).sum(axis=1)
+    np.testing.assert_allclose(solution.constraints["outside.radius"].ravel(), radii, atol=1e-12)
+    assert solution.violations["outside.radius"] == pytest.approx(max(1 - radii.min(), 0), abs=1e-12)
+    # The same solver, each point now on the circle.
+    ring = solve(constraints={"outside.radius": (1.0, 1.0)})
+    np.testing.assert_allclose((ring.values["points"] ** 2).sum(axis=1), 1, atol=1e-8)
+    inside = solve(upper={"points": 0.5}, lower={"points": -0.5}, constraints={"outside.radius": (0.6, np.inf)})
+    assert inside.violations["outside.radius"] == pytest.approx(0.1, abs=1e-3)
