@@ -5,14 +5,22 @@ from __future__ import annotations
 import casadi as ca
 from casadi import SX
 
-from casadi_hands.geometry.smooth import clamp, norm
+from casadi_hands.geometry.smooth import norm
+
+# The normal turns a corner where cap and cylinder meet, and contacts like to sit there: an optimiser jams on it. The
+# rounding, a share of the segment's length, moves the surface by less than 1e-5 of that length.
+_KINK = 1e-3
 
 
 def closest_on_segment(point: SX, start: SX, end: SX) -> SX:
-    """The point of a segment nearest to ``point``; all (3,) in one frame. A segment of no length is allowed."""
+    """The point of a segment nearest to ``point``, smooth at the ends; all (3,) in one frame.
+
+    A segment of no length is allowed.
+    """
     along = end - start
     fraction = ca.dot(point - start, along) / (ca.sumsqr(along) + 1e-12)
-    return start + clamp(fraction, 0, 1) * along
+    rounded = (norm(fraction, _KINK) - norm(fraction - 1, _KINK) + 1) / 2
+    return start + rounded * along
 
 
 def project_to_capsule(point: SX, start: SX, end: SX, radius: SX) -> tuple[SX, SX, SX]:

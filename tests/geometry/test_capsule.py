@@ -33,26 +33,26 @@ def test_projection_outside_agrees_with_coal(case: int) -> None:
     point = 3 * RANDOM.normal(size=3)
     projection, normal, distance = project(point, start, end, 0.3)
     if distance > 0.05:
-        assert distance == pytest.approx(distance_by_coal(point, start, end, 0.3), abs=1e-6)
+        assert distance == pytest.approx(distance_by_coal(point, start, end, 0.3), abs=3e-5)
     np.testing.assert_allclose(point - distance * normal, projection, atol=1e-12)
     assert np.linalg.norm(normal) == pytest.approx(1, abs=1e-12)
     # The projection is on the surface: projecting it again stays, at no distance.
     again, same, none = project(projection, start, end, 0.3)
-    np.testing.assert_allclose(again, projection, atol=1e-9)
-    np.testing.assert_allclose(same, normal, atol=1e-9)
-    assert none == pytest.approx(0, abs=1e-9)
+    np.testing.assert_allclose(again, projection, atol=3e-5)
+    np.testing.assert_allclose(same, normal, atol=3e-3)
+    assert none == pytest.approx(0, abs=3e-5)
 
 
 def test_inside_cap_and_cylinder_in_closed_form() -> None:
     start, end = np.zeros(3), np.array([0, 0, 2.0])
     projection, normal, distance = project([0.1, 0, 1.5], start, end, 0.5)
-    np.testing.assert_allclose(projection, [0.5, 0, 1.5], atol=1e-10)
-    np.testing.assert_allclose(normal, [1, 0, 0], atol=1e-10)
-    assert distance == pytest.approx(-0.4, abs=1e-10)
+    np.testing.assert_allclose(projection, [0.5, 0, 1.5], atol=3e-5)
+    np.testing.assert_allclose(normal, [1, 0, 0], atol=3e-5)
+    assert distance == pytest.approx(-0.4, abs=3e-5)
     projection, normal, distance = project([0, 0.3, 2.4], start, end, 0.5)
-    np.testing.assert_allclose(projection, [0, 0.3, 2.4], atol=1e-9)
-    np.testing.assert_allclose(normal, [0, 0.6, 0.8], atol=1e-9)
-    assert distance == pytest.approx(0, abs=1e-9)
+    np.testing.assert_allclose(projection, [0, 0.3, 2.4], atol=3e-5)
+    np.testing.assert_allclose(normal, [0, 0.6, 0.8], atol=3e-5)
+    assert distance == pytest.approx(0, abs=3e-5)
 
 
 def test_sphere_is_a_capsule_of_no_length() -> None:
@@ -77,4 +77,16 @@ def test_closest_point_of_a_segment() -> None:
     start, end = np.array([1.0, 0, 0]), np.array([1.0, 4, 0])
     for point, expected in (([5, 1, 0], [1, 1, 0]), ([0, -3, 1], [1, 0, 0]), ([0, 9, 1], [1, 4, 0])):
         got = closest_on_segment(ca.DM(point), ca.DM(start), ca.DM(end))
-        np.testing.assert_allclose(np.asarray(got).ravel(), expected, atol=1e-11)
+        np.testing.assert_allclose(np.asarray(got).ravel(), expected, atol=3e-5)
+
+
+def test_normal_bends_smoothly_where_cap_meets_cylinder() -> None:
+    # A normal that turns a corner there makes an optimiser jam, for contacts like to sit at that circle.
+    x = ca.SX.sym("x", 3)
+    _, normal, _ = project_to_capsule(x, ca.SX.zeros(3), ca.SX([0, 0, 1]), ca.SX(0.3))
+    slope = ca.Function("f", [x], [ca.jacobian(normal, x)])
+    across = [np.asarray(slope([0.3, 0, 1 + h])) for h in (-1e-5, 1e-5)]
+    np.testing.assert_allclose(across[0], across[1], atol=0.05)
+    # Away from it the normal is that of the cylinder, and of the cap: it turns by 1 / radius.
+    far = [np.asarray(slope([0.3, 0, 1 + h]))[2, 2] for h in (-0.05, 0.05)]
+    np.testing.assert_allclose(far, [0, 1 / 0.3 * 0.3**3 / np.hypot(0.3, 0.05) ** 3], atol=0.02)
