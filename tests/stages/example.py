@@ -114,7 +114,7 @@ def made_up_finger(model: Model, joints: int, strings: int, seed: int, bend: flo
     rng = np.random.default_rng((joints, seed))
     return FingerSeed(
         base=rng.uniform(-0.8, 0.8, 2),
-        lengths=rng.uniform(0.4, 1.2, joints),
+        lengths=rng.uniform(0.9, 2.0, joints),
         frames=Rotation.random(joints, rng=rng).as_matrix(),
         axes=rng.uniform(-0.7, 0.7, (joints, 2)),
         angles=rng.uniform(-bend, bend, (len(model.schedule.keyframes), joints)),

@@ -28,6 +28,7 @@ from tests.stages.example import (
 Array = np.ndarray
 MARGIN = 0.03  # clearance asked of what need not touch, half extents
 JOINTS = (1, 2, 3)
+BENDS = (1.8, 1.8, 0.4)  # rad: two beyond the joint limits, one straight into the object
 TERMS = {
     "tip_target",
     "null_space",
@@ -45,7 +46,7 @@ class Witness:
     """The terms, unweighted, of some fingers together."""
 
     def __init__(self, model: Model, target: Target, fingers: tuple[FingerSeed, ...]) -> None:
-        self.model, self.target, self.fingers = model, target, fingers
+        self.model, self.target, self.fingers, self.deepest = model, target, fingers, 0.0
         self.pins = [PinFinger(seed) for seed in fingers]
         self.collision_times = np.unique(
             np.concatenate([np.linspace(a, b, 4) for a, b in zip(target.times[:-1], target.times[1:], strict=True)])
@@ -120,6 +121,7 @@ class Witness:
                     gaps = [segments_apart(*link, capsule[:3], capsule[3:6]) - radius - capsule[6] for link in chain]
                     apart += gaps[:-1]
                     total += float(g(-gaps[-1]))  # the last link may touch
+                    self.deepest = max(self.deepest, -gaps[-1])
                 total += float(g(MARGIN - np.array(apart)).sum())
             for i in range(len(links)):
                 for j in range(i):
@@ -137,12 +139,15 @@ class Case:
         self.target = target_of(self.model, made_up_floating(self.model))
         self.stage = SynthesisStage(self.target, (0, 1, 2), JOINTS)
         self.fingers = tuple(
-            made_up_finger(self.model, n, self.target.strings(c), seed=c, bend=1.8) for c, n in enumerate(JOINTS)
+            made_up_finger(self.model, n, self.target.strings(c), seed=c, bend=BENDS[c]) for c, n in enumerate(JOINTS)
         )
         self.fingers[1].lengths[0] = 0.5 * self.model.link_length[0]
-        self.fingers[2].base[:] = [0.9, -0.8]
+        self.fingers[0].base[:] = [0.9, -0.8]
         self.weights = dict(self.task.weights.synthesis)
-        self.expected = Witness(self.model, self.target, self.fingers).terms()
+        witness = Witness(self.model, self.target, self.fingers)
+        self.expected = witness.terms()
+        # A last link is in the object somewhere, or the cost of that would go unseen.
+        assert witness.deepest > 0.02
 
     def evaluate(self, weights: dict[str, object], step: int = 2) -> dict[str, float]:
         parameters = {**self.stage._parameters(self.fingers), **self.stage._weights(weights, step)}

@@ -33,6 +33,7 @@ from tests.stages.test_model import rotations
 Array = np.ndarray
 MARGIN = 0.03
 CONTACTS, JOINTS = (0, 1, 2), (1, 2, 3)
+BENDS = (1.8, 1.8, 0.4)  # rad: two beyond the joint limits, one straight into the object
 HAND_TERMS = {
     "contact_on_finger",
     "slip_on_finger",
@@ -50,7 +51,7 @@ class Witness(ObjectWitness):
 
     def __init__(self, model: Model, values: dict[str, Array], fingers: tuple[FingerSeed, ...]) -> None:
         super().__init__(model, values)
-        self.fingers, self.values = fingers, values
+        self.fingers, self.values, self.deepest = fingers, values, 0.0
         self.pins = [PinFinger(seed) for seed in fingers]
         self.palms = [self.palm_at(0), self.palm_at(-1)]
         self.objects = [self.motion.at(0), self.motion.at(-1)]
@@ -142,6 +143,7 @@ class Witness(ObjectWitness):
                     gaps = [segments_apart(*link, *ends) - radius - capsule[6] for link in chain]
                     apart += gaps[:-1]
                     total += float(g(-gaps[-1]))
+                    self.deepest = max(self.deepest, -gaps[-1])
                 total += float(g(MARGIN - np.array(apart)).sum())
             for i in range(3):
                 for j in range(i):
@@ -156,13 +158,16 @@ class Case:
     def __init__(self, palm_moves: bool) -> None:
         self.task, self.model = everything()
         self.stage = WholeHandStage(self.model, CONTACTS, JOINTS, palm_moves)
-        self.fingers = tuple(made_up_finger(self.model, n, 1, seed=c, bend=1.8) for c, n in enumerate(JOINTS))
+        self.fingers = tuple(made_up_finger(self.model, n, 1, seed=c, bend=BENDS[c]) for c, n in enumerate(JOINTS))
         self.values = made_up_values(self.model)
         self.values |= {f"angles{c}": f.angles for c, f in enumerate(self.fingers)}
         if palm_moves:
             self.values["palm"] = np.random.default_rng(7).uniform(-0.3, 0.3, (len(self.model.schedule.keyframes), 6))
         self.weights = dict(self.task.weights.whole_hand)
-        self.expected = Witness(self.model, self.values, self.fingers).terms()
+        witness = Witness(self.model, self.values, self.fingers)
+        self.expected = witness.terms()
+        # A last link is in the object somewhere, or the cost of that would go unseen.
+        assert witness.deepest > 0.02
 
     def parameters(self, weights: dict[str, float]) -> dict[str, object]:
         return self.stage._parameters(self.fingers) | term_weights(self.stage.problem, self.model, weights)
