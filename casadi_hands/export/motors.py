@@ -1,6 +1,6 @@
 """Position-control gains of a hand's joints, derived from what the hand has to hold.
 
-A motor is stiff enough that the load a joint may meet deflects it by 10 mrad, and its own inertia (of rotor and
+A motor is stiff enough that the load a joint may meet deflects it by 50 mrad, and its own inertia (of rotor and
 gears, seen at the joint) answers with a natural frequency of 200 rad/s, critically damped. Every number follows
 from mass, gravity and lengths, so a task scaled in length and gravity gets the same behaviour.
 """
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from casadi_hands.design import Finger, Hand
     from casadi_hands.task import Task
 
-_DEFLECTION = 0.01  # rad, under the reference load
+_DEFLECTION = 0.05  # rad, under the reference load
 _FREQUENCY = 200.0  # rad/s, of the motor's inertia on its stiffness
 
 

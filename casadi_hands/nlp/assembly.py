@@ -7,6 +7,8 @@ sparse matrix-vector product.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import casadi as ca
 import numpy as np
 import scipy.sparse as sparse
@@ -14,6 +16,7 @@ from casadi import DM, MX, SX, Function, Sparsity
 from numpy.typing import NDArray
 
 from casadi_hands.nlp.kernel import Kernel
+from casadi_hands.nlp.machine_code import compiled
 
 Indices = NDArray[np.int64]
 
@@ -27,12 +30,31 @@ def to_dm(matrix: sparse.sparray) -> DM:
     return DM(pattern, columns.data)
 
 
-def kernel_functions(kernel: Kernel, terms: list[str]) -> dict[str, Function]:
-    """Value, gradient, Jacobian and Hessian of a kernel in its local variables.
+@dataclass(frozen=True)
+class KernelFunctions:
+    """A kernel's value, gradient, Jacobian and Hessian in its local variables, as machine code where possible.
 
-    ``terms`` fixes the order of the weights. Sparse results are returned as columns of their nonzeros; the
-    sparsities are those of the functions ``jacobian_pattern`` and ``hessian_pattern`` hold.
+    Sparse results are columns of their nonzeros, with the patterns given here.
+
+    Attributes:
+        value: (x, p, weights) -> (terms, g).
+        gradient: (x, p, weights) -> (weighted sum of the terms, its gradient).
+        jacobian: (x, p, weights) -> (g, nonzeros of its Jacobian).
+        hessian: (x, p, weights, scale, multipliers) -> nonzeros of the Lagrangian's upper Hessian.
+        jacobian_pattern: of one instance.
+        hessian_pattern: of one instance.
     """
+
+    value: Function
+    gradient: Function
+    jacobian: Function
+    hessian: Function
+    jacobian_pattern: Sparsity
+    hessian_pattern: Sparsity
+
+
+def kernel_functions(kernel: Kernel, terms: list[str]) -> KernelFunctions:
+    """Differentiate a kernel; ``terms`` fixes the order of the weights."""
     x, p = kernel.variables, kernel.parameters
     weights, scale = SX.sym("weights", len(terms)), SX.sym("scale")
     values = ca.vertcat(*[kernel.terms[name] for name in terms]) if terms else SX.zeros(0, 1)
@@ -43,14 +65,15 @@ def kernel_functions(kernel: Kernel, terms: list[str]) -> dict[str, Function]:
     hessian, _ = ca.hessian(scale * total + ca.dot(multipliers, g), x)
     upper = ca.triu(hessian)
     inputs = [x, p, weights]
-    return {
-        "value": Function(kernel.name, inputs, [ca.densify(values), ca.densify(g)]),
-        "gradient": Function(kernel.name + "_grad", inputs, [total, ca.densify(ca.gradient(total, x))]),
-        "jacobian": Function(kernel.name + "_jac", inputs, [ca.densify(g), _nonzeros(jacobian)]),
-        "hessian": Function(kernel.name + "_hess", [*inputs, scale, multipliers], [_nonzeros(upper)]),
-        "jacobian_pattern": Function("jac_pattern", inputs, [jacobian]),
-        "hessian_pattern": Function("hess_pattern", [*inputs, scale, multipliers], [upper]),
+    functions = {
+        "value": Function("value", inputs, [ca.densify(values), ca.densify(g)]),
+        "gradient": Function("gradient", inputs, [total, ca.densify(ca.gradient(total, x))]),
+        "jacobian": Function("jacobian", inputs, [ca.densify(g), _nonzeros(jacobian)]),
+        "hessian": Function("hessian", [*inputs, scale, multipliers], [_nonzeros(upper)]),
     }
+    return KernelFunctions(
+        **compiled(kernel.name, functions), jacobian_pattern=jacobian.sparsity(), hessian_pattern=upper.sparsity()
+    )
 
 
 def _nonzeros(matrix: SX) -> SX:

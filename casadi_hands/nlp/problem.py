@@ -11,7 +11,7 @@ import scipy.sparse as sparse
 from casadi import MX, Function
 from numpy.typing import ArrayLike, NDArray
 
-from casadi_hands.nlp.assembly import gather_nonzeros, kernel_functions, scatter_hessian, scatter_jacobian, to_dm
+from casadi_hands.nlp.assembly import KernelFunctions, gather_nonzeros, kernel_functions, scatter_hessian, scatter_jacobian, to_dm
 from casadi_hands.nlp.kernel import Kernel
 from casadi_hands.nlp.layout import Layout, Rows
 
@@ -29,7 +29,7 @@ class _Bound:
     parameters: NDArray[np.int64]
     count: int
     first_row: int
-    functions: dict[str, Function]
+    functions: KernelFunctions
 
 
 class Problem:
@@ -50,6 +50,7 @@ class Problem:
         self.constraint_lower: Vector = np.empty(0)
         self.constraint_upper: Vector = np.empty(0)
         self._bound: list[_Bound] = []
+        self._functions: dict[Kernel, KernelFunctions] = {}
 
     def variable(
         self, name: str, shape: tuple[int, int], lower: ArrayLike = -np.inf, upper: ArrayLike = np.inf
@@ -103,7 +104,9 @@ class Problem:
         weights = np.array([self.parameters[f"weight.{term}"][0] for term in terms], int)
         first = self.constraints.size
         self._constrain(kernel, count, bounds or {})
-        functions = kernel_functions(kernel, terms)
+        if kernel not in self._functions:
+            self._functions[kernel] = kernel_functions(kernel, terms)
+        functions = self._functions[kernel]
         self._bound.append(_Bound(kernel, terms, weights, selector, positions, count, first, functions))
 
     def _constrain(self, kernel: Kernel, count: int, bounds: dict[str, tuple[ArrayLike, ArrayLike]]) -> None:
@@ -132,8 +135,8 @@ class Problem:
         x, p = MX.sym("x", self.variables.size), MX.sym("p", self.parameters.size)
         scale, multipliers = MX.sym("lam_f"), MX.sym("lam_g", self.constraints.size)
         inputs = [self._inputs(bound, x, p) for bound in self._bound]
-        values = [b.functions["value"].map(b.count)(*i) for b, i in zip(self._bound, inputs, strict=True)]
-        gradients = [b.functions["gradient"].map(b.count)(*i) for b, i in zip(self._bound, inputs, strict=True)]
+        values = [b.functions.value.map(b.count)(*i) for b, i in zip(self._bound, inputs, strict=True)]
+        gradients = [b.functions.gradient.map(b.count)(*i) for b, i in zip(self._bound, inputs, strict=True)]
         f = sum((ca.sum2(total) for total, _ in gradients), MX(0))
         g = ca.vertcat(*[ca.vec(v[1]) for v in values if v[1].numel()]) if self.constraints.size else MX.zeros(0, 1)
         gradient = sum(
@@ -174,23 +177,23 @@ class Problem:
     def _jacobian(self, inputs: list[tuple[MX, MX, MX]]) -> MX:
         parts, sources = [], []
         for bound, arguments in zip(self._bound, inputs, strict=True):
-            pattern = bound.functions["jacobian_pattern"].sparsity_out(0)
+            pattern = bound.functions.jacobian_pattern
             if pattern.nnz():
                 parts.append(scatter_jacobian(bound.selector, bound.count, pattern, bound.first_row))
-                sources.append(ca.vec(bound.functions["jacobian"].map(bound.count)(*arguments)[1]))
+                sources.append(ca.vec(bound.functions.jacobian.map(bound.count)(*arguments)[1]))
         return gather_nonzeros((self.constraints.size, self.variables.size), parts, sources)
 
     def _hessian(self, inputs: list[tuple[MX, MX, MX]], scale: MX, multipliers: MX) -> MX:
         parts, sources = [], []
         for bound, arguments in zip(self._bound, inputs, strict=True):
-            pattern = bound.functions["hessian_pattern"].sparsity_out(0)
+            pattern = bound.functions.hessian_pattern
             if pattern.nnz():
-                width = bound.functions["jacobian_pattern"].size1_out(0)
+                width = bound.functions.jacobian_pattern.size1()
                 local = multipliers[bound.first_row : bound.first_row + width * bound.count]
                 local = ca.reshape(local, width, bound.count) if width else MX.zeros(0, bound.count)
                 scales = ca.repmat(scale, 1, bound.count)
                 parts.append(scatter_hessian(bound.selector, bound.count, pattern))
-                sources.append(ca.vec(bound.functions["hessian"].map(bound.count)(*arguments, scales, local)))
+                sources.append(ca.vec(bound.functions.hessian.map(bound.count)(*arguments, scales, local)))
         return gather_nonzeros((self.variables.size, self.variables.size), parts, sources)
 
 

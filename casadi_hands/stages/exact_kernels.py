@@ -13,7 +13,7 @@ from casadi_hands.nlp import Kernel
 from casadi_hands.stages.finger_symbols import FingerSymbols, PlacedFinger, morphology
 from casadi_hands.stages.hand_kernels import distances
 from casadi_hands.stages.kernels import placed
-from casadi_hands.terms import body, clearance, finger
+from casadi_hands.terms import clearance, finger
 
 SUBSTEPS = 4  # of the integration between two knots
 LEVER_DAMPING = 0.04  # half extents/rad: forces that need a shorter lever than about this count as not supplied
@@ -42,23 +42,56 @@ def tangents(normal: SX, helper: SX) -> tuple[SX, SX]:
     return first, ca.cross(normal, first)
 
 
-def physics(contacts: int) -> Kernel:
-    """Newton–Euler from one knot to the next by RK4; forces and contact points linear in the object's frame."""
+def wrench(contacts: int) -> Kernel:
+    """The contacts' force and torque at a knot, as variables of their own: physics then knows no contacts."""
+    kernel = Kernel("wrench")
+    total = kernel.variable("total", 6)
+    points, forces = _contacts(kernel, contacts, "")
+    kernel.constrain("sum", ca.vertcat(ca.sum2(forces), _torque(points, forces)) - total)
+    return kernel
+
+
+def middle_torque(contacts: int) -> Kernel:
+    """The contacts' torque halfway between two knots, with forces and points linear in the object's frame."""
+    kernel = Kernel("middle_torque")
+    middle = kernel.variable("middle", 3)
+    ends = [_contacts(kernel, contacts, str(i)) for i in range(2)]
+    points, forces = ((ends[0][i] + ends[1][i]) / 2 for i in range(2))
+    kernel.constrain("sum", _torque(points, forces) - middle)
+    return kernel
+
+
+def _contacts(kernel: Kernel, contacts: int, tag: str) -> tuple[SX, SX]:
+    """Declare the points and forces (3, C) of all contacts."""
+    points, forces = (kernel.variable(name + tag, 3 * contacts) for name in ("points", "forces"))
+    return ca.reshape(points, 3, contacts), ca.reshape(forces, 3, contacts)
+
+
+def _torque(points: SX, forces: SX) -> SX:
+    return sum((ca.cross(points[:, i], forces[:, i]) for i in range(points.shape[1])), SX.zeros(3, 1))
+
+
+def physics() -> Kernel:
+    """Newton–Euler from one knot to the next by RK4; forces and contact points linear in the object's frame.
+
+    The force is then linear in time and the torque quadratic: both ends and the middle say all of it.
+    """
     kernel = Kernel("physics")
     states = [(kernel.variable(f"pose{i}", 6), kernel.variable(f"rate{i}", 6)) for i in range(2)]
-    points = [ca.reshape(kernel.variable(f"points{i}", 3 * contacts), 3, contacts) for i in range(2)]
-    forces = [ca.reshape(kernel.variable(f"forces{i}", 3 * contacts), 3, contacts) for i in range(2)]
+    wrenches = [kernel.variable(f"wrench{i}", 6) for i in range(2)]
+    middle = kernel.variable("middle", 3)
     reference, step = kernel.parameter("reference", 4), kernel.parameter("step")
     gravity, inertial = kernel.parameter("gravity", 3), kernel.parameter("inertial")
     inertia = ca.reshape(kernel.parameter("inertia", 9), 3, 3)
-    inverse = ca.inv(inertia)
+    inverse = ca.reshape(kernel.parameter("inverse", 9), 3, 3)
 
     def derivative(state: SX, s: float) -> SX:
         quaternion, velocity, omega = state[3:7], state[7:10], state[10:13]
-        force, point = (1 - s) * forces[0] + s * forces[1], (1 - s) * points[0] + s * points[1]
-        torque = sum((ca.cross(point[:, i], force[:, i]) for i in range(contacts)), SX.zeros(3, 1))
-        total = ca.mtimes(rotation_matrix(quaternion), ca.sum2(force)) + gravity
-        alpha = ca.mtimes(inverse, torque / inertial - body.gyroscopic(inertia, omega, SX.zeros(3, 1)))
+        force = (1 - s) * wrenches[0][:3] + s * wrenches[1][:3]
+        ends = (1 - s) * (1 - 2 * s) * wrenches[0][3:] + s * (2 * s - 1) * wrenches[1][3:]
+        torque = ends + 4 * s * (1 - s) * middle
+        total = ca.mtimes(rotation_matrix(quaternion), force) + gravity
+        alpha = ca.mtimes(inverse, torque / inertial - ca.cross(omega, ca.mtimes(inertia, omega)))
         spin = multiply(quaternion, ca.vertcat(0, omega)) / 2
         return ca.vertcat(velocity, spin, total / inertial, alpha)
 
@@ -132,12 +165,12 @@ class Scene:
         return Touch(on_link, off_object, off_link, normal, in_object, rotation, here)
 
 
-def contact(joints: int, index: int) -> Kernel:
+def contact(joints: int, index: int, limited: bool) -> Kernel:
     """One touching contact at one knot: on both surfaces, normals opposed, in the cone, supplied by the joints.
 
     Constraints: ``on_surfaces`` (2), ``opposed`` (2), ``facing`` (1: cosine between the outward normals),
     ``pressing`` (1: normal force), ``cone`` (1: (μ f_n)² - f_t²), ``passive`` (3: force no joint supplies),
-    ``torque`` (n).
+    and where the task limits it ``torque`` (n).
     """
     kernel = Kernel(f"contact{index}")
     symbols = free_morphology(kernel, joints)
@@ -158,7 +191,8 @@ def contact(joints: int, index: int) -> Kernel:
     in_palm = ca.mtimes(touch.rotation, force)
     passive = finger.null_space_force(touch.placed.jacobian, in_palm, LEVER_DAMPING)
     kernel.constrain("passive", passive)
-    kernel.constrain("torque", ca.mtimes(touch.placed.jacobian.T, in_palm))
+    if limited:
+        kernel.constrain("torque", ca.mtimes(touch.placed.jacobian.T, in_palm))
     kernel.cost("passive_force", passive)
     kernel.cost("stay_point", point - wanted_point)
     kernel.cost("stay_force", force - wanted_force)
@@ -197,7 +231,7 @@ def rolling(joints: int, index: int) -> Kernel:
     return kernel
 
 
-def apart(joints: int, primitives: int, index: int, touched: int | None) -> Kernel:
+def apart(joints: int, primitives: int, index: int, touched: int | None, grounded: bool) -> Kernel:
     """One finger clear of palm, ground, itself and the object at one time.
 
     Args:
@@ -205,6 +239,7 @@ def apart(joints: int, primitives: int, index: int, touched: int | None) -> Kern
         primitives: of the object.
         index: the contact.
         touched: the primitive the last link touches, left out; None where it must stay clear of all.
+        grounded: whether there is a ground.
     """
     kernel = Kernel(f"apart{index}" if touched is None else f"apart_touching{index}")
     symbols = free_morphology(kernel, joints)
@@ -228,7 +263,8 @@ def apart(joints: int, primitives: int, index: int, touched: int | None) -> Kern
         for k in range(primitives)
     ]
     here = symbols.placed(angles)
-    clear, last = distances(here, radius, palm_radius, ca.horzcat(*seen), to_palm[:, 2], ground - palm_position[2])
+    up = to_palm[:, 2] if grounded else None
+    clear, last = distances(here, radius, palm_radius, ca.horzcat(*seen), up, ground - palm_position[2])
     others = [last[k] for k in range(primitives) if k != touched]
     kernel.constrain("clear", ca.vertcat(clear, *others))
     return kernel
@@ -248,13 +284,14 @@ def fingers_apart(joints: int, other_joints: int, tag: str) -> Kernel:
     return kernel
 
 
-def joint_motion(joints: int, index: int) -> Kernel:
-    """One finger's angles at three knots: smooth, within the speed limit."""
+def joint_motion(joints: int, index: int, limited: bool) -> Kernel:
+    """One finger's angles at three knots: smooth, and within the speed limit if there is one."""
     kernel = Kernel(f"joint_motion{index}")
     angles = [kernel.variable(f"angles{i}", joints) for i in range(3)]
     step = kernel.parameter("step")
     kernel.cost("joint_acceleration", (angles[2] - 2 * angles[1] + angles[0]) / step**2)
-    kernel.constrain("speed", ca.vertcat(angles[1] - angles[0], angles[2] - angles[1]) / step)
+    if limited:
+        kernel.constrain("speed", ca.vertcat(angles[1] - angles[0], angles[2] - angles[1]) / step)
     return kernel
 
 

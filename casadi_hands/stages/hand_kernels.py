@@ -92,14 +92,17 @@ def object_clearance(joints: int, primitives: int, moves: bool) -> Kernel:
     return kernel
 
 
-def distances(here: PlacedFinger, radius: SX, palm_radius: SX, primitives: SX, up: SX, ground: SX) -> tuple[SX, SX]:
-    """Distances between one finger and all but other fingers: those to keep apart, and the touching link's (K,)."""
+def distances(
+    here: PlacedFinger, radius: SX, palm_radius: SX, primitives: SX, up: SX | None, ground: SX
+) -> tuple[SX, SX]:
+    """Distances between one finger and all but other fingers: those to keep apart, and the touching link's (K,).
+
+    Without a ground ``up`` is None.
+    """
     ends = here.ends
-    apart = [
-        clearance.links_and_palm(ends, radius, palm_radius),
-        clearance.links_and_ground(ends, radius, up, ground),
-        clearance.links_of_one(ends, radius),
-    ]
+    apart = [clearance.links_and_palm(ends, radius, palm_radius), clearance.links_of_one(ends, radius)]
+    if up is not None:
+        apart.append(clearance.links_and_ground(ends, radius, up, ground))
     if len(ends) > 1:
         apart.append(clearance.links_and_object(ends[:-1], radius, primitives))
     return ca.vertcat(*apart), clearance.links_and_object(ends[-1:], radius, primitives)

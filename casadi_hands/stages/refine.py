@@ -41,8 +41,8 @@ class Margin:
         passive: largest component of a force that no joint supplies, m·g.
     """
 
-    friction: float = 0.7
-    normal_force: float = 0.25
+    friction: float = 0.5
+    normal_force: float = 0.6
     passive: float = 0.009
 
 
@@ -97,9 +97,12 @@ class RefineStage:
         self._common()
         now, later = np.arange(count - 1), np.arange(1, count)
         states = [r.take(k) for k in (now, later) for r in (self.pose, self.rate)]
-        pairs = [r.take(k) for r in (self.point, self.force) for k in (now, later)]
-        common = [p["reference"], p["step"], p["gravity"], p["inertial"], p["inertia"]]
-        problem.bind(kernels.physics(len(contacts)), [*states, *pairs], common, {"defect": (0, 0)})
+        wrenches = [self.wrench.take(now), self.wrench.take(later), self.middle]
+        common = [p[name] for name in ("reference", "step", "gravity", "inertial", "inertia", "inverse")]
+        problem.bind(kernels.physics(), [*states, *wrenches], common, {"defect": (0, 0)})
+        problem.bind(kernels.wrench(len(contacts)), [self.wrench, self.point, self.force], [], {"sum": (0, 0)})
+        ends = [r.take(k) for k in (now, later) for r in (self.point, self.force)]
+        problem.bind(kernels.middle_torque(len(contacts)), [self.middle, *ends], [], {"sum": (0, 0)})
         problem.bind(kernels.force_change(len(contacts)), [self.force.take(now), self.force.take(later)])
         wanted = problem.parameter("wanted_pose", (count, 6))
         problem.bind(kernels.stay_on_path(), [self.pose], [wanted])
@@ -115,6 +118,8 @@ class RefineStage:
         self.rate = problem.variable("rate", (count, 6))
         self.point = problem.variable("point", (count, 3 * len(self.contacts)))
         self.force = problem.variable("force", (count, 3 * len(self.contacts)), -MOST_FORCE, MOST_FORCE)
+        self.wrench = problem.variable("wrench", (count, 6))
+        self.middle = problem.variable("middle_torque", (count - 1, 3))
         shortest, longest = model.link_length
         reach = model.palm_radius
         self.angles, self.shape = [], []
@@ -131,7 +136,7 @@ class RefineStage:
     def _common(self) -> None:
         problem, model = self.problem, self.model
         count = len(model.schedule.samples)
-        widths = {"reference": 4, "gravity": 3, "inertial": 1, "inertia": 9, "radius": 1, "palm_radius": 1}
+        widths = {"reference": 4, "gravity": 3, "inertial": 1, "inertia": 9, "inverse": 9, "radius": 1, "palm_radius": 1}
         widths |= {"ground_height": 1, "friction": 1, "primitives": 7 * len(model.primitives)}
         for name, width in widths.items():
             problem.parameter(name, (1, width))
@@ -166,10 +171,10 @@ class RefineStage:
             "pressing": (0, np.inf),
             "cone": (0, np.inf),
             "passive": _FREE,
-            "torque": (-torque, torque),
+            "torque": (-torque, torque),  # bound only where the task limits it
         }
         parameters = [frames, *self._scene(c, touching), own[0], p["friction"], *own[1:]]
-        problem.bind(kernels.contact(n, c), rows, parameters, bounds)
+        problem.bind(kernels.contact(n, c, np.isfinite(torque)), rows, parameters, bounds)
         start = np.flatnonzero(self.active[:-1, i])
         rows = [r.constant(len(start)) for r in shape]
         for knots in (start, start + 1):
@@ -183,7 +188,7 @@ class RefineStage:
         three = [angles.take(mirrored[offset : offset + count]) for offset in range(3)]
         speed = model.speed_limit
         steps = p["step"][np.clip(knots - 1, 0, count - 2)]
-        problem.bind(kernels.joint_motion(n, c), three, [steps], {"speed": (-speed, speed)})
+        problem.bind(kernels.joint_motion(n, c, np.isfinite(speed)), three, [steps], {"speed": (-speed, speed)})
         own = [problem.parameter(f"wanted_{name}{c}", (1, k)) for name, k in (("base", 2), ("lengths", n), ("axes", 2 * n))]
         reach = (model.palm_radius - model.link_radius) ** 2
         problem.bind(kernels.stay(n, c), shape, own, {"on_palm": (0, reach)})
@@ -196,7 +201,7 @@ class RefineStage:
         for knots, skipped in ((np.flatnonzero(self.touching[:, i]), touched), (np.flatnonzero(~self.touching[:, i]), None)):
             if not len(knots):
                 continue
-            kernel = kernels.apart(n, primitives, c, skipped)
+            kernel = kernels.apart(n, primitives, c, skipped, model.ground is not None)
             rows = [*[r.constant(len(knots)) for r in self.shape[i]], self.pose.take(knots), self.angles[i].take(knots)]
             places = [p["palm_position"][knots], p["palm_quaternion"][knots]]
             scene = [p[name] for name in ("radius", "palm_radius", "ground_height", "primitives")]
@@ -269,6 +274,10 @@ class RefineStage:
             "point": start.point[:, chosen].reshape(len(samples), -1),
             "force": start.force[:, chosen].reshape(len(samples), -1),
         }
+        points, forces = (values[name].reshape(len(samples), -1, 3) for name in ("point", "force"))
+        values["wrench"] = np.hstack([forces.sum(axis=1), np.cross(points, forces).sum(axis=1)])
+        halfway = [(a[1:] + a[:-1]) / 2 for a in (points, forces)]
+        values["middle_torque"] = np.cross(*halfway).sum(axis=1)
         for c, finger, angles in zip(self.contacts, start.fingers, start.angles, strict=True):
             values |= {f"angles{c}": angles, f"base{c}": finger.base, f"lengths{c}": finger.lengths}
             values[f"axes{c}"] = finger.axes.reshape(1, -1)
@@ -292,6 +301,7 @@ class RefineStage:
             "gravity": model.gravity,
             "inertial": model.units.inertial,
             "inertia": model.inertia.reshape(1, 9),
+            "inverse": np.linalg.inv(model.inertia).reshape(1, 9),
             "radius": model.link_radius,
             "palm_radius": model.palm_radius,
             "ground_height": NO_GROUND if model.ground is None else model.ground.height,
