@@ -22,9 +22,9 @@ from casadi_hands.stages.synthesis import AXIS_RANGE, FingerSeed
 from casadi_hands.stages.whole_hand import WholeHand
 
 Array = NDArray[np.float64]
-_EXACT = (("nlp_scaling_method", "none"), ("bound_push", 1e-4), ("bound_frac", 1e-4))
-SOFT = Options(max_iter=80, tol=1e-3, acceptable_tol=1e-2, constr_viol_tol=1e-6, mu_init=1e-2, extra=_EXACT)
-HARD = Options(max_iter=150, tol=1e-6, acceptable_tol=1e-5, constr_viol_tol=1e-10, mu_init=1e-3, extra=_EXACT)
+_EXACT = (("nlp_scaling_method", "none"), ("mu_strategy", "adaptive"))
+SOFT = Options(max_iter=150, tol=1e-3, acceptable_tol=1e-2, constr_viol_tol=1e-6, mu_init=1e-2, extra=_EXACT)
+HARD = Options(max_iter=200, tol=1e-6, acceptable_tol=1e-5, constr_viol_tol=1e-10, mu_init=1e-2, extra=_EXACT)
 CLEARANCE = 0.02  # half extents, asked of bodies that do not touch
 ACCEPTED = 1e-7  # largest violation with which a refined motion is handed on
 HOPELESS = 0.3  # half extents of slip that a firm solve leaves when rolling is out of a structure's reach
