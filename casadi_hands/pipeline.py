@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -19,14 +20,36 @@ from casadi_hands.search.work import processes
 from casadi_hands.stages.floating import Floating, FloatingStage
 from casadi_hands.stages.model import Model, build_model
 from casadi_hands.stages.outcome import floating_motion, hand_of, joint_loads, whole_hand_motion
-from casadi_hands.stages.refine import Refined, RefineStage
+from casadi_hands.stages.refine import WEIGHTS, Margin, Refined, RefineStage
 from casadi_hands.stages.target import target_of
 from casadi_hands.stages.whole_hand import WholeHand, WholeHandStage
 from casadi_hands.task import Task
-from casadi_hands.verify import Audit, audit
+from casadi_hands.verify import Audit, audit, replay
 
 STAGES = ("floating", "synthesis", "whole_hand", "refine")
+AMPLE = Margin()
+SMALL = Margin(friction=0.8, normal_force=0.25)
+FIRM = Margin(friction=0.35, normal_force=1.0)
 HANDS_REFINED = 2  # hands of one structure that are tried before fingers get another joint
+
+_CONSTRAINTS = {  # what a violated constraint means
+    "physics.defect": "be moved as planned by the forces of its contacts",
+    "wrench.sum": "be moved as planned by the forces of its contacts",
+    "middle_torque.sum": "be moved as planned by the forces of its contacts",
+    "contact.on_surfaces": "reach its contact",
+    "contact.opposed": "reach its contact with its surface facing the object's",
+    "contact.facing": "reach its contact from outside the object",
+    "contact.pressing": "press firmly enough",
+    "contact.cone": "press without slipping",
+    "contact.passive": "supply its force with its joints",
+    "contact.torque": "supply its force within the torque limit",
+    "rolling.no_slip": "roll with the object",
+    "apart.clear": "stay clear of the other bodies",
+    "apart_touching.clear": "stay clear of the other bodies",
+    "fingers_apart.clear": "stay clear of the other fingers",
+    "joint_motion.speed": "keep within the joints' speed limit",
+    "stay.on_palm": "start on the palm",
+}
 
 
 @dataclass(frozen=True)
@@ -100,8 +123,7 @@ class _Run:
         if self.until == "floating":
             return self._keep(self._stopped("floating"))
         search = self._search(floating)
-        found = search.run()
-        self._record_search(search, found)
+        found = self._search_on(search)
         if self.until == "synthesis":
             return self._keep(self._stopped("synthesis"))
         if self.until == "whole_hand":
@@ -114,7 +136,7 @@ class _Run:
     def _floating(self) -> Floating:
         with self._stage("floating", f"object's motion with {self.model.contacts} floating contacts"):
             result = FloatingStage(self.model).solve(self.task.weights.floating)
-        runs = [run_record("floating", what, self.task.search.seed, what, s) for what, s in result.runs[:-1]]
+        runs = [run_record("floating", what, self.task.search.seed, what, s) for what, s in result.runs]
         self._extend(runs, "floating", result.solution, self.task.weights.floating)
         self.design = replace(self.design, motion=floating_motion(self.model, result))
         self._keep(replace(self.design, reason="stopped before a hand was designed"))
@@ -134,13 +156,17 @@ class _Run:
             progress=lambda text: self._say("synthesis", text),
         )
 
-    def _record_search(self, search: Search, found: Found) -> None:
+    def _search_on(self, search: Search, least: Mapping[int, int] | None = None) -> Found:
+        """Run the search, from ``least`` joints a finger, and adopt its best hand."""
+        with self._stage("synthesis", f"fingers for {len(search.contacts)} contacts"):
+            found = search.run(least)
         best = found.candidates[0]
         self._extend(search.take_runs(), "synthesis", best.hand.solution, self.task.weights.synthesis)
         hand = hand_of(self.task, self.model, best.hand.fingers, best.hand.contacts, 1.0, 1.0)
         self.design = replace(self.design, hand=hand, motion=None)
         joints = "+".join(map(str, best.joints))
         self._say("synthesis", f"best hand has {joints} joints, scores {', '.join(f'{s:.3f}' for s in best.scores)}")
+        return found
 
     def _whole_hand(self, floating: Floating, candidate: Candidate) -> WholeHand:
         with self._stage("whole_hand", f"object and hand of {'+'.join(map(str, candidate.joints))} joints together"):
@@ -159,34 +185,53 @@ class _Run:
             failing: set[str] = set()
             for candidate in found.candidates[:HANDS_REFINED]:
                 whole = self._whole_hand(floating, candidate)
-                refined = self._exact(whole)
-                self._adopt(refined.hand)
-                judged = self._judge(self.design, _reason(self.model, refined))
-                missed = sum(not figure["holds"] for figure in judged.certificate.values())
+                judged, refined = self._certify(whole)
                 if judged.status == "certified":
                     return judged
+                self._say("refine", f"not certified: {judged.reason}")
+                missed = sum(not figure["holds"] for figure in judged.certificate.values())
                 if best is None or missed < best[0]:
                     best = (missed, judged)
                 failing |= _failing(self.model, refined)
-                if max(refined.slips.values()) > 0.0 and refined.runs[-1][0] == "firm":
+                if refined.slips_hopelessly:
                     break  # a structure that must slip will do so in any of its hands
             least = self._more_joints(search, found, failing)
             if least is None:
                 return best[1]
-            self._say("synthesis", f"not certified yet; another joint for {', '.join(sorted(failing))}")
-            found = search.run(least)
-            self._record_search(search, found)
+            self._say("synthesis", f"another joint for {', '.join(sorted(failing)) or 'the fingers with fewest'}")
+            found = self._search_on(search, least)
 
-    def _exact(self, whole: WholeHand) -> Refined:
+    def _certify(self, whole: WholeHand) -> tuple[Design, Refined]:
+        """Refine one hand with an ample margin, with a small one where that fails, with more where a replay drops."""
+        joints = tuple(finger.joints for finger in whole.fingers)
         with self._stage("refine", "the same motion with exact physics, rolling contacts and clearance"):
-            joints = tuple(finger.joints for finger in whole.fingers)
-            result = RefineStage(self.model, whole.contacts, joints, whole.active).solve(whole)
-        runs = [run_record("refine", "hand", self.task.search.seed, what, s) for what, s in result.runs]
-        self.design = replace(self.design, stages=[*self.design.stages, *runs])
-        terms = result.runs[-1][1].terms
-        costs = {name: {"weight": 1.0, "value": value} for name, value in terms.items()}
-        self.design = replace(self.design, costs={**self.design.costs, "refine": costs})
-        return result
+            stage = RefineStage(self.model, whole.contacts, joints, whole.active)
+            refined = stage.solve(whole, AMPLE)
+        if not refined.exact and not refined.slips_hopelessly:
+            with self._stage("refine", "again, closer to the limits of friction and grip"):
+                refined = self._better(refined, stage.solve(whole, SMALL))
+        judged = self._judged(refined)
+        if judged.status == "certified" and _drops(judged):
+            with self._stage("refine", "again with a firmer grip: a replay dropped the object"):
+                firmer = stage.solve(whole, FIRM)
+            again = self._judged(firmer)
+            if again.status == "certified" and not _drops(again):
+                return again, firmer
+        return judged, refined
+
+    def _better(self, first: Refined, second: Refined) -> Refined:
+        return second if second.exact or second.worst[1] < first.worst[1] else first
+
+    def _judged(self, refined: Refined) -> Design:
+        """Adopt a refined hand and have it audited."""
+        runs = [run_record("refine", "hand", self.task.search.seed, what, s) for what, s in refined.runs]
+        last = refined.runs[-1][1]
+        costs = {name: {"weight": WEIGHTS[name], "value": value} for name, value in last.terms.items()}
+        self.design = replace(
+            self.design, stages=[*self.design.stages, *runs], costs={**self.design.costs, "refine": costs}
+        )
+        self._adopt(refined.hand)
+        return self._judge(self.design, _reason(self.model, refined))
 
     def _more_joints(self, search: Search, found: Found, failing: set[str]) -> dict[int, int] | None:
         """Joints of each finger for the next round; None when no failing finger may have more."""
@@ -261,7 +306,7 @@ def _short_of(found: Found) -> str:
 
 def _failing(model: Model, refined: Refined) -> set[str]:
     """Names of the fingers that kept a motion from being exact; none if it cannot be laid to fingers."""
-    if refined.runs[-1][0] == "firm":
+    if refined.slips_hopelessly:
         most = max(refined.slips.values())
         return {name for name, slip in refined.slips.items() if slip > 0.3 * most}
     kernel = refined.worst[0].split(".")[0]
@@ -274,10 +319,21 @@ def _reason(model: Model, refined: Refined) -> str:
     if refined.exact:
         return ""
     joints = {model.contact_names[c]: f.joints for c, f in zip(refined.hand.contacts, refined.hand.fingers, strict=True)}
-    if refined.runs[-1][0] == "firm":
+    if refined.slips_hopelessly:
         worst = max(refined.slips, key=lambda name: refined.slips[name])
         slip = refined.slips[worst] * model.units.length * 1e3
         return f"finger '{worst}' with {joints[worst]} joint(s) cannot roll with the object: it slips {slip:.1f} mm"
-    constraint, violation = refined.worst
-    return f"the motion could not be made exact: {constraint} is still violated by {violation:.2g}"
+    kernel, constraint = refined.worst[0].split(".")
+    who = _failing(model, refined)
+    subject = f"finger '{min(who)}'" if who else "the object"
+    what = _CONSTRAINTS.get(f"{kernel.rstrip('0123456789_')}.{constraint}", f"meet {refined.worst[0]}")
+    return f"no exact motion was found with {'+'.join(map(str, joints.values()))} joints: {subject} cannot {what}"
 
+
+def _drops(design: Design) -> bool:
+    """Whether a replay of the nominal motion drops the object; False where there is no simulator to ask."""
+    if importlib.util.find_spec("mujoco") is None:
+        return False
+    with tempfile.TemporaryDirectory() as scratch:
+        design.save(scratch)
+        return replay(scratch).dropped

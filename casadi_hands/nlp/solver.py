@@ -117,6 +117,7 @@ class Solver:
 
         Raises:
             KeyError: a name that is not in the problem, or a parameter left out.
+            KeyboardInterrupt: the solve was interrupted.
         """
         problem = self.problem
         missing = [name for name in problem.parameters.names() if name not in parameters]
@@ -137,6 +138,9 @@ class Solver:
         started = time.perf_counter()
         answer = solver(**arguments)
         seconds = time.perf_counter() - started
+        if solver.stats()["return_status"] == "NonIpopt_Exception_Thrown":
+            # CasADi turns an interrupt into this status and goes on.
+            raise KeyboardInterrupt
         return self._solution(answer, p, (lbg, ubg), solver.stats(), seconds)
 
     def evaluate(self, values: Mapping[str, ArrayLike], parameters: Mapping[str, ArrayLike]) -> dict[str, float]:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from casadi_hands.errors import SolveError
 from casadi_hands.search.score import THRESHOLD, finger_scores
 from casadi_hands.search.work import combine_fingers, design_finger, run_all
 from casadi_hands.stages.synthesis import FingerSeed, Synthesised
@@ -81,6 +82,8 @@ class Search:
         self.names = target.model.contact_names
         # A contact that never acts has no finger.
         self.contacts = tuple(c for c in range(len(self.names)) if target.active[:, c].any())
+        if not self.contacts:
+            raise SolveError("no finger contact is ever active: the task needs no hand, or none could help")
         self.pools: dict[int, list[tuple[float, FingerSeed]]] = {c: [] for c in self.contacts}
         self.runs: list[dict[str, Any]] = []
 
@@ -114,7 +117,7 @@ class Search:
             best[contact] = min(best[contact], _alone(result))
             trial = index % self.trials + 1
             self.progress(
-                f"synthesis  finger {self.names[contact]}, {joints[contact]} joint(s), trial {trial}/{self.trials}, "
+                f"finger {self.names[contact]}, {joints[contact]} joint(s), trial {trial}/{self.trials}, "
                 f"best score {best[contact]:.3f}"
             )
 
@@ -139,7 +142,7 @@ class Search:
             work.append((self.target, self.contacts, fingers, self.weights))
 
         def done(index: int, result: Synthesised) -> None:
-            self.progress(f"synthesis  hand {index + 1}/{len(work)}, objective {result.solution.objective:.3f}")
+            self.progress(f"hand {index + 1}/{len(work)}, objective {result.solution.objective:.3f}")
 
         results = run_all(self.executor, combine_fingers, work, done)
         candidates = []

@@ -6,6 +6,7 @@ import hashlib
 import multiprocessing
 import os
 import pickle
+import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
@@ -57,7 +58,10 @@ def processes(jobs: int | None) -> Iterator[Executor | None]:
     saved = {name: os.environ.get(name) for name in _THREADS}
     os.environ.update(dict.fromkeys(_THREADS, "1"))
     try:
-        with ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn")) as executor:
+        context = multiprocessing.get_context("spawn")
+        # An interrupt is the parent's to handle: workers end with it, silently.
+        quiet = {"initializer": signal.signal, "initargs": (signal.SIGINT, signal.SIG_IGN)}
+        with ProcessPoolExecutor(count, mp_context=context, **quiet) as executor:  # type: ignore[arg-type]
             yield executor
     finally:
         for name, value in saved.items():

@@ -38,6 +38,7 @@ class Floating:
         active: (N, C) bool.
         activity: (N, C) the contact invariants before thresholds.
         threshold: that gave ``active``; 0 where all contacts had to stay.
+        solution: the solve this motion is from.
         runs: every solve: (what, solution).
     """
 
@@ -47,12 +48,8 @@ class Floating:
     active: NDArray[np.bool_]
     activity: Array
     threshold: float
+    solution: Solution
     runs: tuple[tuple[str, Solution], ...]
-
-    @property
-    def solution(self) -> Solution:
-        """The solve this motion is from."""
-        return self.runs[-1][1]
 
 
 class FloatingStage:
@@ -105,7 +102,6 @@ class FloatingStage:
             best = (0.0, solution.objective, solution)
             runs.append(("all active", solution))
         threshold, _, chosen = best
-        runs.append(("chosen", chosen))
         values, contacts = chosen.values, sizes(self.model)[2]
         return Floating(
             pose=values["pose"],
@@ -114,6 +110,7 @@ class FloatingStage:
             active=values["activity"] > 0.5,
             activity=free.values["activity"],
             threshold=threshold,
+            solution=chosen,
             runs=tuple(runs),
         )
 

@@ -64,16 +64,41 @@ def friction_edges(normals: Array, friction: Array) -> Array:
     return np.array(columns).T
 
 
+def needed_wrenches(model: Model, pose: Array) -> Array:
+    """Wrench (N, 6) in m·g and m·g·length, object frame, that contacts must make at each keyframe of a motion.
+
+    Args:
+        model: the task.
+        pose: (N, 6) keyframes: position and rotation vector from the reference.
+    """
+    schedule, inertial = model.schedule, model.units.inertial
+    at = schedule.keyframe_samples
+    before, now, after = (schedule.spline(offset)[at] @ pose for offset in (-1, 0, 1))
+    acceleration = (after - 2 * now + before)[:, :3] / schedule.step**2
+    reference = pin.Quaternion(*model.reference).matrix()
+    wrenches = []
+    for k in range(len(pose)):
+        turns = [pin.exp3(row[3:]) @ reference for row in (before[k], now[k], after[k])]
+        spins = [pin.log3(turns[i].T @ turns[i + 1]) / schedule.step for i in range(2)]
+        omega, alpha = (spins[0] + spins[1]) / 2, (spins[1] - spins[0]) / schedule.step
+        force = turns[1].T @ (inertial * acceleration[k] - model.gravity)
+        torque = inertial * (np.cross(omega, model.inertia @ omega) + model.inertia @ alpha)
+        wrenches.append(np.concatenate([force, torque]))
+    return np.array(wrenches)
+
+
 def passes_gate(model: Model, values: Mapping[str, Array]) -> bool:
-    """Whether at every keyframe the active contacts have the rank of all contacts and can make the needed wrench."""
+    """Whether at every keyframe the active contacts have the rank of all contacts and can make the needed wrench.
+
+    The needed wrench is the motion's own: inertial forces less gravity, in the object's frame.
+    """
+    wrenches_needed = needed_wrenches(model, values["pose"])
     _, capsules, friction = _surfaces(model)
     contacts = len(capsules)
-    samples = model.schedule.keyframe_samples
-    for k, sample in enumerate(samples):
+    for k in range(len(model.schedule.keyframes)):
         points = values["point"][k].reshape(contacts, 3)
         active = values["activity"][k] > 0.5
-        forces = values["force"][sample].reshape(contacts, 3) * active[:, None]
-        needed = grasp_map(points) @ forces.reshape(-1)
+        needed = wrenches_needed[k]
         grasp = grasp_map(points[active])
         if np.linalg.matrix_rank(grasp, 1e-6) < np.linalg.matrix_rank(grasp_map(points), 1e-6):
             return False

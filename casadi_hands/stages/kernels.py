@@ -78,9 +78,12 @@ def dynamics(contacts: int, suffix: str = "", regularise: bool = True) -> Kernel
     return kernel
 
 
-def contact_forces(suffix: str = "") -> Kernel:
-    """One finger contact at one sample: eq. 2.7, 2.8, 2.10, 2.12 and the slip they miss."""
-    kernel = Kernel("contact" + suffix)
+def contact_forces(suffix: str = "", tag: str = "") -> Kernel:
+    """One finger contact at one sample: eq. 2.7, 2.8, 2.10, 2.12 and the slip they miss.
+
+    Friction is also a constraint: the exponential of eq. 2.8 alone lets forces out of the cone by 0.1 m·g.
+    """
+    kernel = Kernel("contact" + tag + suffix)
     force, activity = kernel.variable("force", 3), kernel.variable("activity", 1)
     point, before = kernel.variable("point", 3), kernel.variable("point_before", 3)
     capsule, friction, sharpness, step = (
@@ -92,6 +95,7 @@ def contact_forces(suffix: str = "") -> Kernel:
     kernel.cost("raw_force" + suffix, force)
     cone = contact.friction_cone(force, -normal, friction, sharpness)
     kernel.cost("friction_cone" + suffix, activity * cone, "sum")
+    kernel.constrain("in_cone", contact.cone_margin(force, -normal, friction))
     kernel.cost("contact_on_object" + suffix, contact.off_surface(force, activity, point, projection), "sum")
     gaps = (projection - point, projection_before - before)
     kernel.cost("slip_on_object" + suffix, contact.gap_rate(force, activity, *gaps, step))
@@ -128,6 +132,7 @@ def ground_contact(suffix: str = "") -> Kernel:
     upward_in_object = rotation.T[:, 2]
     cone = contact.friction_cone(force, upward_in_object, friction, sharpness)
     kernel.cost("ground_friction_cone" + suffix, activity * cone, "sum")
+    kernel.constrain("in_cone", contact.cone_margin(force, upward_in_object, friction))
     off = contact.off_surface(force, activity, point, projection)
     kernel.cost("contact_on_object" + suffix, off, "sum")
     above = contact.off_surface(force, activity, in_world[2], height)

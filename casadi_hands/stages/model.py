@@ -6,8 +6,7 @@ The only place where SI units turn into nondimensional ones (method notes: weigh
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
-from functools import cached_property
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -122,19 +121,6 @@ class Model:
     def perturbed(self) -> bool:
         """Whether the task asks for a second scenario with external wrenches."""
         return bool(np.any(self.perturbation_force) or np.any(self.perturbation_torque))
-
-    @cached_property
-    def structure(self) -> str:
-        """A text equal for equal models, to key caches."""
-        return repr([(f.name, _plain(getattr(self, f.name))) for f in fields(self)])
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if hasattr(value, "__dataclass_fields__"):
-        return [(f.name, _plain(getattr(value, f.name))) for f in fields(value)]
-    return value
 
 
 def round_off(value: Any) -> Any:

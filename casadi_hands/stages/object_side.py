@@ -107,13 +107,13 @@ def _bind_scenario(problem: Problem, model: Model, side: ObjectSide, force: Rows
     common = [p["reference"], p["step"], p["gravity"], *external, p["inertia"], p["inertial"]]
     kernel = kernels.dynamics(contacts, suffix, regularise=not suffix)
     problem.bind(kernel, [*side.pose, side.point[1], force, side.activity], common)
-    kernel = kernels.contact_forces(suffix)
     capsules = problem.parameter(f"capsules{suffix}", (model.contacts, 7))
     for i in range(model.contacts):
         span = (3 * i, 3 * i + 3)
         rows = [force.entries(*span), side.activity.entries(i, i + 1), side.point[1].entries(*span)]
         parameters = [capsules[i : i + 1], p["friction"], p["sharpness"], p["step"]]
-        problem.bind(kernel, [*rows, side.point[0].entries(*span)], parameters)
+        named = kernels.contact_forces(suffix, str(i))
+        problem.bind(named, [*rows, side.point[0].entries(*span)], parameters, {"in_cone": (0, np.inf)})
     if model.ground is not None:
         i, span = contacts - 1, (3 * contacts - 3, 3 * contacts)
         rows = [side.pose[1], side.pose[0], side.point[1].entries(*span), force.entries(*span)]
@@ -121,7 +121,7 @@ def _bind_scenario(problem: Problem, model: Model, side: ObjectSide, force: Rows
         capsule = problem.parameter(f"ground_capsule{suffix}", (1, 7))
         friction = problem.parameter(f"ground_friction{suffix}", (1, 1))
         parameters = [p["reference"], capsule, p["ground_height"], friction, p["sharpness"], p["step"]]
-        problem.bind(kernels.ground_contact(suffix), rows, parameters)
+        problem.bind(kernels.ground_contact(suffix), rows, parameters, {"in_cone": (0, np.inf)})
 
 
 def _bind_points(problem: Problem, model: Model, side: ObjectSide) -> None:

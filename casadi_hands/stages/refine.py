@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 _EXACT = (("nlp_scaling_method", "none"), ("mu_strategy", "adaptive"))
 SOFT = Options(max_iter=150, tol=1e-3, acceptable_tol=1e-2, constr_viol_tol=1e-6, mu_init=1e-2, extra=_EXACT)
 HARD = Options(max_iter=200, tol=1e-6, acceptable_tol=1e-5, constr_viol_tol=1e-10, mu_init=1e-2, extra=_EXACT)
+JOINT_MARGIN = 0.005  # rad, so that a smooth curve through the knots stays within the limits between them
 CLEARANCE = 0.02  # half extents, asked of bodies that do not touch
 ACCEPTED = 1e-7  # largest violation with which a refined motion is handed on
 HOPELESS = 0.3  # half extents of slip that a firm solve leaves when rolling is out of a structure's reach
@@ -82,6 +83,11 @@ class Refined:
     moved: dict[str, dict[str, float]]
     runs: tuple[tuple[str, Solution], ...]
 
+    @property
+    def slips_hopelessly(self) -> bool:
+        """Whether the firm solve was left with so much slip that no exact one was tried."""
+        return self.runs[-1][0] == "firm"
+
 
 class RefineStage:
     """The stage's problem for one structure: joints of each finger and when each contact touches."""
@@ -121,10 +127,11 @@ class RefineStage:
         self.wrench = problem.variable("wrench", (count, 6))
         self.middle = problem.variable("middle_torque", (count - 1, 3))
         shortest, longest = model.link_length
+        lowest, highest = model.joint_limits
         reach = model.palm_radius
         self.angles, self.shape = [], []
         for c, n in zip(self.contacts, self.joints, strict=True):
-            self.angles.append(problem.variable(f"angles{c}", (count, n), *model.joint_limits))
+            self.angles.append(problem.variable(f"angles{c}", (count, n), lowest + JOINT_MARGIN, highest - JOINT_MARGIN))
             self.shape.append(
                 [
                     problem.variable(f"base{c}", (1, 2), -reach, reach),

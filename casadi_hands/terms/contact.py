@@ -22,6 +22,12 @@ def friction_cone(force: SX, inward_normal: SX, friction: SX, sharpness: SX) -> 
     return soft_exponential(sharpness * (tangential - friction * pressing))
 
 
+def cone_margin(force: SX, inward_normal: SX, friction: SX) -> SX:
+    """μ f_n - ‖f_t‖ in m·g, rounded to the safe side where the tangential force vanishes; negative outside the cone."""
+    pressing = ca.dot(force, inward_normal)
+    return friction * pressing - norm(force - pressing * inward_normal, 1e-3)
+
+
 def off_surface(force: SX, activity: SX, point: SX, projection: SX) -> SX:
     """‖f‖ c ‖proj(r) - r‖² (eq. 2.10 and its form for fingers); a plain value."""
     return norm(force, 1e-3) * activity * ca.sumsqr(projection - point)
