@@ -135,9 +135,9 @@ class _Run:
 
     def _floating(self) -> Floating:
         with self._stage("floating", f"object's motion with {self.model.contacts} floating contacts"):
-            result = FloatingStage(self.model).solve(self.task.weights.floating)
+            result = FloatingStage(self.model).solve(dict(self.task.weights.floating))
         runs = [run_record("floating", what, self.task.search.seed, what, s) for what, s in result.runs]
-        self._extend(runs, "floating", result.solution, self.task.weights.floating)
+        self._extend(runs, "floating", result.solution, dict(self.task.weights.floating))
         self.design = replace(self.design, motion=floating_motion(self.model, result))
         self._keep(replace(self.design, reason="stopped before a hand was designed"))
         return result
@@ -161,7 +161,7 @@ class _Run:
         with self._stage("synthesis", f"fingers for {len(search.contacts)} contacts"):
             found = search.run(least)
         best = found.candidates[0]
-        self._extend(search.take_runs(), "synthesis", best.hand.solution, self.task.weights.synthesis)
+        self._extend(search.take_runs(), "synthesis", best.hand.solution, dict(self.task.weights.synthesis))
         hand = hand_of(self.task, self.model, best.hand.fingers, best.hand.contacts, 1.0, 1.0)
         self.design = replace(self.design, hand=hand, motion=None)
         joints = "+".join(map(str, best.joints))
@@ -171,9 +171,9 @@ class _Run:
     def _whole_hand(self, floating: Floating, candidate: Candidate) -> WholeHand:
         with self._stage("whole_hand", f"object and hand of {'+'.join(map(str, candidate.joints))} joints together"):
             stage = WholeHandStage(self.model, candidate.hand.contacts, candidate.joints, self.task.palm.may_move)
-            result = stage.solve(floating, candidate.hand.fingers, self.task.weights.whole_hand)
+            result = stage.solve(floating, candidate.hand.fingers, dict(self.task.weights.whole_hand))
         runs = [run_record("whole_hand", "hand", self.task.search.seed, "", result.solution)]
-        self._extend(runs, "whole_hand", result.solution, self.task.weights.whole_hand)
+        self._extend(runs, "whole_hand", result.solution, dict(self.task.weights.whole_hand))
         self._adopt(result)
         self._keep(replace(self.design, reason="stopped before the motion was refined"))
         return result
@@ -196,7 +196,7 @@ class _Run:
                 if refined.slips_hopelessly:
                     break  # a structure that must slip will do so in any of its hands
             least = self._more_joints(search, found, failing)
-            if least is None:
+            if least is None and best is not None:
                 return best[1]
             self._say("synthesis", f"another joint for {', '.join(sorted(failing)) or 'the fingers with fewest'}")
             found = self._search_on(search, least)
@@ -277,7 +277,7 @@ class _Run:
         """Add a stage's runs and its terms' weights and weighted values."""
         costs = {}
         for name, value in solution.terms.items():
-            weight = dict(weights).get(name.removesuffix("_perturbed"), 0.0)
+            weight = weights.get(name.removesuffix("_perturbed"), 0.0)
             weight = weight[-1] if isinstance(weight, tuple | list) else weight
             costs[name] = {"weight": float(weight), "value": value}
         all_costs = {**self.design.costs, stage: costs}
@@ -301,7 +301,8 @@ def _short_of(found: Found) -> str:
     """Why fingers of the search still miss their contacts, if some do."""
     if not found.short:
         return ""
-    return f"finger(s) {', '.join(found.short)} cannot follow their contact within {max(found.candidates[0].joints)} joints"
+    most = max(found.candidates[0].joints)
+    return f"finger(s) {', '.join(found.short)} cannot follow their contact within {most} joints"
 
 
 def _failing(model: Model, refined: Refined) -> set[str]:
@@ -318,7 +319,9 @@ def _reason(model: Model, refined: Refined) -> str:
     """Why a refined motion is not exact, in the user's terms; empty if it is."""
     if refined.exact:
         return ""
-    joints = {model.contact_names[c]: f.joints for c, f in zip(refined.hand.contacts, refined.hand.fingers, strict=True)}
+    joints = {
+        model.contact_names[c]: f.joints for c, f in zip(refined.hand.contacts, refined.hand.fingers, strict=True)
+    }
     if refined.slips_hopelessly:
         worst = max(refined.slips, key=lambda name: refined.slips[name])
         slip = refined.slips[worst] * model.units.length * 1e3

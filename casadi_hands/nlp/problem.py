@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -11,7 +11,14 @@ import scipy.sparse as sparse
 from casadi import MX, Function
 from numpy.typing import ArrayLike, NDArray
 
-from casadi_hands.nlp.assembly import KernelFunctions, gather_nonzeros, kernel_functions, scatter_hessian, scatter_jacobian, to_dm
+from casadi_hands.nlp.assembly import (
+    KernelFunctions,
+    gather_nonzeros,
+    kernel_functions,
+    scatter_hessian,
+    scatter_jacobian,
+    to_dm,
+)
 from casadi_hands.nlp.kernel import Kernel
 from casadi_hands.nlp.layout import Layout, Rows
 
@@ -70,7 +77,7 @@ class Problem:
         kernel: Kernel,
         variables: Sequence[Rows],
         parameters: Sequence[NDArray[np.int64]] = (),
-        bounds: dict[str, tuple[ArrayLike, ArrayLike]] | None = None,
+        bounds: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
     ) -> None:
         """Evaluate a kernel once for each row of its arguments.
 
@@ -109,7 +116,7 @@ class Problem:
         functions = self._functions[kernel]
         self._bound.append(_Bound(kernel, terms, weights, selector, positions, count, first, functions))
 
-    def _constrain(self, kernel: Kernel, count: int, bounds: dict[str, tuple[ArrayLike, ArrayLike]]) -> None:
+    def _constrain(self, kernel: Kernel, count: int, bounds: Mapping[str, tuple[ArrayLike, ArrayLike]]) -> None:
         """Reserve the kernel's constraint rows, instance after instance, and set their bounds."""
         sizes = {name: g.numel() for name, g in kernel.constraints.items()}
         width = sum(sizes.values())

@@ -162,7 +162,9 @@ class Solver:
             terms=dict(zip(problem.terms, terms.tolist(), strict=True)),
             objective=float(answer["f"]),
             violation=float(max(beyond.max(initial=0.0), 0.0)),
-            violations={name: float(max(beyond[rows].max(initial=0.0), 0.0)) for name, rows in problem.constraint_rows.items()},
+            violations={
+                name: float(max(beyond[rows].max(initial=0.0), 0.0)) for name, rows in problem.constraint_rows.items()
+            },
             constraints={name: g[rows] for name, rows in problem.constraint_rows.items()},
             status=str(stats["return_status"]),
             iterations=int(stats["iter_count"]),

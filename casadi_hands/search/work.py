@@ -60,8 +60,9 @@ def processes(jobs: int | None) -> Iterator[Executor | None]:
     try:
         context = multiprocessing.get_context("spawn")
         # An interrupt is the parent's to handle: workers end with it, silently.
-        quiet = {"initializer": signal.signal, "initargs": (signal.SIGINT, signal.SIG_IGN)}
-        with ProcessPoolExecutor(count, mp_context=context, **quiet) as executor:  # type: ignore[arg-type]
+        with ProcessPoolExecutor(
+            count, mp_context=context, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)
+        ) as executor:
             yield executor
     finally:
         for name, value in saved.items():

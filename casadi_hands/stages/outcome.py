@@ -24,7 +24,9 @@ Array = NDArray[np.float64]
 _RESERVE = 1.5  # of torque and speed limits over what the motion uses, where the task names no actuator
 
 
-def hand_of(task: Task, model: Model, fingers: Sequence[FingerSeed], contacts: Sequence[int], effort: float, speed: float) -> Hand:
+def hand_of(
+    task: Task, model: Model, fingers: Sequence[FingerSeed], contacts: Sequence[int], effort: float, speed: float
+) -> Hand:
     """The hand in SI; limits of the actuator if the task names one, else 1.5 times the motion's own torque and speed.
 
     Args:
@@ -39,8 +41,8 @@ def hand_of(task: Task, model: Model, fingers: Sequence[FingerSeed], contacts: S
     built = []
     for finger, contact in zip(fingers, contacts, strict=True):
         links = tuple(
-            Link(float(l * length), model.link_radius * length, tuple(map(float, a / np.linalg.norm(a))))
-            for l, a in zip(finger.lengths, finger.axis_vectors, strict=True)
+            Link(float(part * length), model.link_radius * length, _triple(a / np.linalg.norm(a)))
+            for part, a in zip(finger.lengths, finger.axis_vectors, strict=True)
         )
         base = (float(finger.base[0] * length), float(finger.base[1] * length), 0.0)
         built.append(Finger(model.contact_names[contact], base, links))
@@ -57,25 +59,29 @@ def hand_of(task: Task, model: Model, fingers: Sequence[FingerSeed], contacts: S
     )
 
 
+def _triple(vector: Array) -> tuple[float, float, float]:
+    x, y, z = vector.tolist()
+    return x, y, z
+
+
 def floating_motion(model: Model, floating: Floating) -> Motion:
     """The object's motion of stage 1, with no joints and every contact's link named ``none``."""
     schedule = model.schedule
     spline = catmull_rom(schedule.keyframes, schedule.samples)
     pose = spline @ floating.pose
-    count, contacts = floating.force.shape[:2]
-    point = (spline @ floating.point.reshape(len(floating.point), -1)).reshape(count, contacts, 3)
+    count = len(schedule.samples)
+    point = (spline @ floating.point.reshape(len(floating.point), -1)).reshape(count, -1, 3)
     active = floating.active[schedule.sample_keyframes]
     names = model.contact_names + (("ground",) if model.ground is not None else ())
     links = ["none"] * model.contacts + (["ground"] if model.ground is not None else [])
-    return _motion(
-        model, pose[:, :3], pose[:, 3:], model.palm_position, model.palm_quaternion, np.zeros((count, 0)), (), names, links,
-        active, floating.force * active[:, :, None], point, np.zeros_like(point),
-    )  # fmt: skip
+    force, nowhere, angles = floating.force * active[:, :, None], np.zeros_like(point), np.zeros((count, 0))
+    palm = model.palm_position, model.palm_quaternion
+    return _motion(model, pose[:, :3], pose[:, 3:], *palm, angles, (), names, links, active, force, point, nowhere)
 
 
 def whole_hand_motion(model: Model, result: WholeHand) -> Motion:
     """The motion of stage 3; each contact's point on the link is the point of its surface nearest the object's."""
-    count, contacts = result.force.shape[:2]
+    count = len(result.force)
     names = model.contact_names + (("ground",) if model.ground is not None else ())
     capsules = model.capsules if model.ground is None else np.vstack([model.capsules, model.ground.capsule])
     point = np.array([on_capsules(p, capsules, inward_normals(p, capsules)) for p in result.point])
@@ -88,7 +94,9 @@ def whole_hand_motion(model: Model, result: WholeHand) -> Motion:
         for s in range(count):
             in_palm = _in_palm(model, result, s, point[s, contact])
             base = np.append(finger.base, 0)
-            origins, rotations, *_ = function(base, finger.axis_vectors.T, finger.lengths, result.angles[i][s], ca.DM.zeros(3))
+            origins, rotations, *_ = function(
+                base, finger.axis_vectors.T, finger.lengths, result.angles[i][s], ca.DM.zeros(3)
+            )
             local = np.asarray(rotations)[:, -3:].T @ (in_palm - np.asarray(origins)[:, -1])
             on_link[s, contact] = on_capsules(local[None], tip, inward_normals(local[None], tip))[0]
     if model.ground is not None:
@@ -96,10 +104,10 @@ def whole_hand_motion(model: Model, result: WholeHand) -> Motion:
         on_link[:, -1, 2] = model.ground.height
     angles = np.hstack(result.angles) if result.angles else np.zeros((count, 0))
     joint_names = tuple(f"finger{i}_joint{j}" for i, f in enumerate(result.fingers) for j in range(f.joints))
+    object_pose, palm = (result.position, result.vector), (result.palm_position, result.palm_quaternion)
     return _motion(
-        model, result.position, result.vector, result.palm_position, result.palm_quaternion, angles, joint_names,
-        names, links, result.active, result.force, point, on_link,
-    )  # fmt: skip
+        model, *object_pose, *palm, angles, joint_names, names, links, result.active, result.force, point, on_link
+    )
 
 
 def _rotation(model: Model, vector: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Stage 4: the same motion as a hard-constrained problem at dense knots, the morphology free (method beyond the thesis).
+"""Stage 4, beyond the thesis: the same motion as a hard-constrained problem at dense knots, the morphology free.
 
 Newton–Euler by shooting, contact on both surfaces with opposed normals, rolling without slip, friction cones with a
 margin, a floor on normal forces, forces that joints supply with a lever, clearance: all constraints. Reached by
@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from casadi_hands.nlp import Options, Problem, Rows, Solution, Solver
 from casadi_hands.stages import exact_kernels as kernels
 from casadi_hands.stages.model import Model
 from casadi_hands.stages.object_side import GOAL_TOLERANCE, MOST_FORCE, MOST_TURN, NO_GROUND
-from casadi_hands.stages.synthesis import AXIS_RANGE, FingerSeed
+from casadi_hands.stages.synthesis import AXIS_RANGE
 from casadi_hands.stages.whole_hand import WholeHand
 
 Array = NDArray[np.float64]
@@ -29,6 +29,7 @@ JOINT_MARGIN = 0.005  # rad, so that a smooth curve through the knots stays with
 CLEARANCE = 0.02  # half extents, asked of bodies that do not touch
 ACCEPTED = 1e-7  # largest violation with which a refined motion is handed on
 HOPELESS = 0.3  # half extents of slip that a firm solve leaves when rolling is out of a structure's reach
+Bounds = dict[str, tuple[ArrayLike, ArrayLike]]
 _FREE = (-np.inf, np.inf)
 
 
@@ -92,7 +93,9 @@ class Refined:
 class RefineStage:
     """The stage's problem for one structure: joints of each finger and when each contact touches."""
 
-    def __init__(self, model: Model, contacts: tuple[int, ...], joints: tuple[int, ...], active: NDArray[np.bool_]) -> None:
+    def __init__(
+        self, model: Model, contacts: tuple[int, ...], joints: tuple[int, ...], active: NDArray[np.bool_]
+    ) -> None:
         self.model, self.contacts, self.joints = model, contacts, joints
         self.active = active[:, list(contacts)]
         self.touching = self.active | np.vstack([np.zeros((1, len(contacts)), bool), self.active[:-1]])
@@ -131,7 +134,9 @@ class RefineStage:
         reach = model.palm_radius
         self.angles, self.shape = [], []
         for c, n in zip(self.contacts, self.joints, strict=True):
-            self.angles.append(problem.variable(f"angles{c}", (count, n), lowest + JOINT_MARGIN, highest - JOINT_MARGIN))
+            self.angles.append(
+                problem.variable(f"angles{c}", (count, n), lowest + JOINT_MARGIN, highest - JOINT_MARGIN)
+            )
             self.shape.append(
                 [
                     problem.variable(f"base{c}", (1, 2), -reach, reach),
@@ -143,7 +148,15 @@ class RefineStage:
     def _common(self) -> None:
         problem, model = self.problem, self.model
         count = len(model.schedule.samples)
-        widths = {"reference": 4, "gravity": 3, "inertial": 1, "inertia": 9, "inverse": 9, "radius": 1, "palm_radius": 1}
+        widths = {
+            "reference": 4,
+            "gravity": 3,
+            "inertial": 1,
+            "inertia": 9,
+            "inverse": 9,
+            "radius": 1,
+            "palm_radius": 1,
+        }
         widths |= {"ground_height": 1, "friction": 1, "primitives": 7 * len(model.primitives)}
         for name, width in widths.items():
             problem.parameter(name, (1, width))
@@ -168,7 +181,10 @@ class RefineStage:
         shape, angles = self.shape[i], self.angles[i]
         point, force = self.point.entries(3 * i, 3 * i + 3), self.force.entries(3 * i, 3 * i + 3)
         touching = np.flatnonzero(self.touching[:, i])
-        rows = [*[r.constant(len(touching)) for r in shape], *[r.take(touching) for r in (self.pose, point, force, angles)]]
+        rows = [
+            *[r.constant(len(touching)) for r in shape],
+            *[r.take(touching) for r in (self.pose, point, force, angles)],
+        ]
         own = [p[f"{name}{c}"][touching] for name in ("helper", "wanted_point", "wanted_force")]
         torque = model.torque_limit
         bounds = {
@@ -186,7 +202,13 @@ class RefineStage:
         rows = [r.constant(len(start)) for r in shape]
         for knots in (start, start + 1):
             rows += [r.take(knots) for r in (self.pose, point, angles)]
-        parameters = [frames, *self._scene(c, start), *self._scene(c, start + 1), p[f"helper{c}"][start], p["step"][start]]
+        parameters = [
+            frames,
+            *self._scene(c, start),
+            *self._scene(c, start + 1),
+            p[f"helper{c}"][start],
+            p["step"][start],
+        ]
         problem.bind(kernels.rolling(n, c), rows, parameters, {"no_slip": _FREE})
         self._bind_clearance(i, frames)
         # The motion mirrored at both ends, so that joints start and end at rest.
@@ -196,7 +218,9 @@ class RefineStage:
         speed = model.speed_limit
         steps = p["step"][np.clip(knots - 1, 0, count - 2)]
         problem.bind(kernels.joint_motion(n, c, np.isfinite(speed)), three, [steps], {"speed": (-speed, speed)})
-        own = [problem.parameter(f"wanted_{name}{c}", (1, k)) for name, k in (("base", 2), ("lengths", n), ("axes", 2 * n))]
+        own = [
+            problem.parameter(f"wanted_{name}{c}", (1, k)) for name, k in (("base", 2), ("lengths", n), ("axes", 2 * n))
+        ]
         reach = (model.palm_radius - model.link_radius) ** 2
         problem.bind(kernels.stay(n, c), shape, own, {"on_palm": (0, reach)})
 
@@ -205,7 +229,10 @@ class RefineStage:
         p = problem.parameters
         primitives = len(model.primitives)
         touched = int(np.argmin(np.abs(model.primitives - model.capsules[c]).sum(axis=1)))
-        for knots, skipped in ((np.flatnonzero(self.touching[:, i]), touched), (np.flatnonzero(~self.touching[:, i]), None)):
+        for knots, skipped in (
+            (np.flatnonzero(self.touching[:, i]), touched),
+            (np.flatnonzero(~self.touching[:, i]), None),
+        ):
             if not len(knots):
                 continue
             kernel = kernels.apart(n, primitives, c, skipped, model.ground is not None)
@@ -228,20 +255,22 @@ class RefineStage:
         margin = margin or Margin()
         values, parameters = self._start(start), self._parameters(start, margin)
         lower, upper = self._bounds()
-        pressing = {}
+        pressing: Bounds = {}
         for i, c in enumerate(self.contacts):
             knots = np.flatnonzero(self.touching[:, i])
             floor = np.where(self.active[knots, i], margin.normal_force, 0.0)[:, None]
             pressing[f"contact{c}.pressing"] = (floor, np.inf)
-        roll = {f"rolling{c}.no_slip": (0.0, 0.0) for c in self.contacts}
-        supply = {f"contact{c}.passive": (-margin.passive, margin.passive) for c in self.contacts}
+        roll: Bounds = {f"rolling{c}.no_slip": (0.0, 0.0) for c in self.contacts}
+        supply: Bounds = {f"contact{c}.passive": (-margin.passive, margin.passive) for c in self.contacts}
         runs: list[tuple[str, Solution]] = []
         for what, weights, hard, options in (
-            ("soft", WEIGHTS, {}, SOFT),
-            ("firm", WEIGHTS | FIRM, {}, SOFT),
+            ("soft", WEIGHTS, Bounds(), SOFT),
+            ("firm", WEIGHTS | FIRM, Bounds(), SOFT),
             ("exact", WEIGHTS, roll | supply, HARD),
         ):
-            weighted = {f"weight.{term}": weights[term] / self.knots for term in self.problem.terms}
+            weighted: dict[str, ArrayLike] = {
+                f"weight.{term}": weights[term] / self.knots for term in self.problem.terms
+            }
             solution = self.solver.solve(values, parameters | weighted, options, lower, upper, pressing | hard)
             runs.append((what, solution))
             values = solution.values
@@ -254,7 +283,9 @@ class RefineStage:
     def _slips(self, solution: Solution) -> dict[str, float]:
         """Path length of each contact's slip."""
         return {
-            self.model.contact_names[c]: float(np.linalg.norm(solution.constraints[f"rolling{c}.no_slip"], axis=1).sum())
+            self.model.contact_names[c]: float(
+                np.linalg.norm(solution.constraints[f"rolling{c}.no_slip"], axis=1).sum()
+            )
             for c in self.contacts
         }
 
@@ -265,7 +296,10 @@ class RefineStage:
         pose = np.tile([np.inf] * 3 + [MOST_TURN] * 3, (count, 1))
         low_pose, high_pose = -pose, pose
         if model.tool is None:
-            goals, at = np.hstack([model.goal_positions, model.goal_vectors]), schedule.keyframe_samples[list(schedule.goals)]
+            goals, at = (
+                np.hstack([model.goal_positions, model.goal_vectors]),
+                schedule.keyframe_samples[list(schedule.goals)],
+            )
             low_pose[at], high_pose[at] = goals - GOAL_TOLERANCE, goals + GOAL_TOLERANCE
         rate = np.full((count, 6), np.inf)
         rate[[0, -1]] = 0.0
@@ -300,10 +334,9 @@ class RefineStage:
             spins[k] = pin.log3(turns[k - 1].T @ turns[k + 1]) / (samples[k + 1] - samples[k - 1])
         return spins
 
-    def _parameters(self, start: WholeHand, margin: Margin) -> dict[str, Array | float]:
+    def _parameters(self, start: WholeHand, margin: Margin) -> dict[str, ArrayLike]:
         model = self.model
-        count = len(model.schedule.samples)
-        values: dict[str, Array | float] = {
+        values: dict[str, ArrayLike] = {
             "reference": model.reference,
             "gravity": model.gravity,
             "inertial": model.units.inertial,

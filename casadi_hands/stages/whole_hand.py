@@ -67,7 +67,14 @@ class WholeHand:
 
 
 class WholeHandStage:
-    """The stage's problem for one structure: a number of joints for each finger."""
+    """The stage's problem for one structure.
+
+    Args:
+        model: the task.
+        contacts: index of each finger's contact.
+        joints: number of joints of each finger.
+        palm_moves: whether the palm may leave its given motion.
+    """
 
     def __init__(self, model: Model, contacts: tuple[int, ...], joints: tuple[int, ...], palm_moves: bool) -> None:
         self.model, self.contacts, self.joints, self.palm_moves = model, contacts, joints, palm_moves
@@ -104,7 +111,10 @@ class WholeHandStage:
             problem.bind(kernels.touch(n, palm_moves), rows, [*given, *before, *shape, *tail])
             three = [angles[c].combine(at[offset]) for offset in (-1, 0, 1)]
             problem.bind(kernels.move(n), three, [*shape, p["lowest"], p["highest"], p["step"]])
-            tail = [p[name] for name in ("reference", "link_radius", "palm_radius", "ground_height", "margin", "all_primitives")]
+            tail = [
+                p[name]
+                for name in ("reference", "link_radius", "palm_radius", "ground_height", "margin", "all_primitives")
+            ]
             kernel = kernels.object_clearance(n, len(model.primitives), palm_moves)
             problem.bind(kernel, [side.pose[1], now, *palms[:1]], [*given, *shape, *tail])
             for d, m in zip(contacts[:i], joints[:i], strict=True):
@@ -126,9 +136,13 @@ class WholeHandStage:
         return [self.problem.parameters[f"{name}{contact}"] for name in ("frames", "base", "lengths", "axes")]
 
     def solve(
-        self, floating: Floating, fingers: tuple[FingerSeed, ...], weights: Mapping[str, float], options: Options = OPTIONS
+        self,
+        floating: Floating,
+        fingers: tuple[FingerSeed, ...],
+        weights: Mapping[str, float],
+        options: Options = OPTIONS,
     ) -> WholeHand:
-        """Start from stage 1's motion and stage 2's angles, contacts moved to the object's point nearest the fingertip's."""
+        """Start from stage 1's motion and stage 2's angles, contacts to the object's point nearest the tip."""
         model = self.model
         flags = floating.active.astype(float)
         start = {
