@@ -155,11 +155,14 @@ class Simulation:
         for i in range(round((SQUEEZE + RELEASE) / self.step)):
             time = i * self.step
             force, torque = self._support(1.0 - max(0.0, time - SQUEEZE) / RELEASE)
-            self._follow(plan, 0, min(time / SQUEEZE, 1.0), moving=False)
-            self._advance(plan.external_force[0] + force, plan.external_torque[0] + torque, observer)
+            squeeze = min(time / SQUEEZE, 1.0)
+            self._follow(plan, 0, squeeze, moving=False)
+            # What the fingers do not bear yet: on its springs alone the object would sag and be gripped there.
+            unborne = -(1.0 - squeeze) * self.model.body_mass[self._object] * self.model.opt.gravity
+            self._advance(plan.external_force[0] + force + unborne, plan.external_torque[0] + torque, observer)
 
     def _support(self, share: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return a share of the spring force and torque that hold the object at its start, weight included."""
+        """Return a share of the spring force and torque that hold the object at its start."""
         mass, inertia = self.model.body_mass[self._object], float(np.max(self.model.body_inertia[self._object]))
         position, quaternion = self.object_pose()
         turn = Rotation.from_quat(quaternion, scalar_first=True)
