@@ -30,6 +30,14 @@ STAGES = ("floating", "synthesis", "whole_hand", "refine")
 AMPLE = Margin()
 SMALL = Margin(friction=0.8, normal_force=0.25)
 FIRM = Margin(friction=0.35, normal_force=1.0)
+FEASIBLE = {  # beyond these a motion is none: m, degrees, m·g
+    "goal_position": 0.001,
+    "goal_angle": 1.0,
+    "residual": 0.1,
+    "friction_excess": 0.05,
+    "gap": 0.001,
+    "penetration": 0.002,
+}
 HANDS_REFINED = 2  # hands of one structure that are tried before fingers get another joint
 
 _CONSTRAINTS = {  # what a violated constraint means
@@ -128,7 +136,7 @@ class _Run:
             return self._keep(self._stopped("synthesis"))
         if self.until == "whole_hand":
             self._whole_hand(floating, found.candidates[0])
-            return self._keep(self._judge(self.design, _short_of(found)))
+            return self._keep(self._judge(self.design, "; ".join(found.short)))
         return self._keep(self._refine(floating, search, found))
 
     # What each stage does.
@@ -185,7 +193,7 @@ class _Run:
             failing: set[str] = set()
             for candidate in found.candidates[:HANDS_REFINED]:
                 whole = self._whole_hand(floating, candidate)
-                judged, refined = self._certify(whole)
+                judged, refined = self._certify(whole, found.short)
                 if judged.status == "certified":
                     return judged
                 self._say("refine", f"not certified: {judged.reason}")
@@ -201,7 +209,7 @@ class _Run:
             self._say("synthesis", f"another joint for {', '.join(sorted(failing)) or 'the fingers with fewest'}")
             found = self._search_on(search, least)
 
-    def _certify(self, whole: WholeHand) -> tuple[Design, Refined]:
+    def _certify(self, whole: WholeHand, short: tuple[str, ...]) -> tuple[Design, Refined]:
         """Refine one hand with an ample margin, with a small one where that fails, with more where a replay drops."""
         joints = tuple(finger.joints for finger in whole.fingers)
         with self._stage("refine", "the same motion with exact physics, rolling contacts and clearance"):
@@ -210,11 +218,11 @@ class _Run:
         if not refined.exact and not refined.slips_hopelessly:
             with self._stage("refine", "again, closer to the limits of friction and grip"):
                 refined = self._better(refined, stage.solve(whole, SMALL))
-        judged = self._judged(refined)
+        judged = self._judged(refined, short)
         if judged.status == "certified" and _drops(judged):
             with self._stage("refine", "again with a firmer grip: a replay dropped the object"):
                 firmer = stage.solve(whole, FIRM)
-            again = self._judged(firmer)
+            again = self._judged(firmer, short)
             if again.status == "certified" and not _drops(again):
                 return again, firmer
         return judged, refined
@@ -222,8 +230,8 @@ class _Run:
     def _better(self, first: Refined, second: Refined) -> Refined:
         return second if second.exact or second.worst[1] < first.worst[1] else first
 
-    def _judged(self, refined: Refined) -> Design:
-        """Adopt a refined hand and have it audited."""
+    def _judged(self, refined: Refined, short: tuple[str, ...]) -> Design:
+        """Adopt a refined hand and have it audited; ``short`` says what its fingers could not do before."""
         runs = [run_record("refine", "hand", self.task.search.seed, what, s) for what, s in refined.runs]
         last = refined.runs[-1][1]
         costs = {name: {"weight": WEIGHTS[name], "value": value} for name, value in last.terms.items()}
@@ -231,7 +239,8 @@ class _Run:
             self.design, stages=[*self.design.stages, *runs], costs={**self.design.costs, "refine": costs}
         )
         self._adopt(refined.hand)
-        return self._judge(self.design, _reason(self.model, refined))
+        reasons = [*short, *filter(None, [_reason(self.model, refined)])]
+        return self._judge(self.design, "; ".join(reasons))
 
     def _more_joints(self, search: Search, found: Found, failing: set[str]) -> dict[int, int] | None:
         """Joints of each finger for the next round; None when no failing finger may have more."""
@@ -260,7 +269,9 @@ class _Run:
         if verdict.certified:
             return replace(design, status="certified", reason="", certificate=certificate)
         text = "; ".join([*([reason] if reason else []), *verdict.reasons])
-        return replace(design, status="feasible", reason=text, certificate=certificate)
+        values = {name: certificate[name]["value"] for name in FEASIBLE if name in certificate}
+        possible = all(value is not None and value <= FEASIBLE[name] for name, value in values.items())
+        return replace(design, status="feasible" if possible else "failed", reason=text, certificate=certificate)
 
     def _stopped(self, stage: str) -> Design:
         return replace(self.design, status="feasible", reason=f"stopped after the stage {stage}, as asked")
@@ -295,14 +306,6 @@ class _Run:
         seconds = dict(self.design.seconds)
         seconds[name] = seconds.get(name, 0.0) + time.perf_counter() - began
         self.design = replace(self.design, seconds=seconds)
-
-
-def _short_of(found: Found) -> str:
-    """Why fingers of the search still miss their contacts, if some do."""
-    if not found.short:
-        return ""
-    most = max(found.candidates[0].joints)
-    return f"finger(s) {', '.join(found.short)} cannot follow their contact within {most} joints"
 
 
 def _failing(model: Model, refined: Refined) -> set[str]:

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from casadi_hands.errors import SolveError
-from casadi_hands.search.score import THRESHOLD, finger_scores
+from casadi_hands.search.score import THRESHOLD, finger_scores, worst_miss
 from casadi_hands.search.work import combine_fingers, design_finger, run_all
 from casadi_hands.stages.synthesis import FingerSeed, Synthesised
 from casadi_hands.stages.target import Target
 
+_REACHED = 0.03  # half extents: a tip this near its contact reaches it
 Progress = Callable[[str], None]
 
 
@@ -44,7 +45,7 @@ class Found:
 
     Attributes:
         candidates: hands of the last round, best objective first.
-        short: names of contacts whose finger stayed above the threshold at the most joints allowed.
+        short: why fingers stayed above the threshold at the most joints allowed, one sentence each.
     """
 
     candidates: tuple[Candidate, ...]
@@ -98,10 +99,22 @@ class Search:
             scores = dict(zip(self.contacts, best.scores, strict=True))
             growing = {c for c in self.contacts if joints[c] < self.max_joints and scores[c] >= self.threshold}
             if not growing:
-                short = tuple(self.names[c] for c in self.contacts if scores[c] >= self.threshold)
+                short = tuple(self._shortcoming(best, c) for c in self.contacts if scores[c] >= self.threshold)
                 return Found(tuple(candidates), short)
             for c in growing:
                 joints[c] += 1
+
+    def _shortcoming(self, best: Candidate, contact: int) -> str:
+        """What a finger cannot do, in the user's terms."""
+        miss, time = worst_miss(self.target, best.hand, contact)
+        joints = best.joints[self.contacts.index(contact)]
+        finger, length = f"finger '{self.names[contact]}'", self.target.model.units.length
+        if miss > _REACHED:
+            away = 1e3 * miss * length
+            return (
+                f"{finger} cannot reach its contact at {time:.3g} s with {joints} joint(s): it misses by {away:.1f} mm"
+            )
+        return f"{finger} cannot supply the force of its contact with {joints} joint(s)"
 
     def _grow(self, joints: Mapping[int, int], growing: list[int]) -> None:
         """Fresh trials of the fingers that got a joint."""

@@ -48,6 +48,15 @@ def finger_scores(target: Target, hand: Synthesised) -> Array:
     return scores
 
 
+def worst_miss(target: Target, hand: Synthesised, contact: int) -> tuple[float, float]:
+    """How far (half extents) and when (s) a finger is farthest from its contact while that acts."""
+    finger = hand.fingers[hand.contacts.index(contact)]
+    points, _ = contact_kinematics(finger, target.string_of(contact), target.link_radius)
+    misses = np.where(target.active[:, contact], np.linalg.norm(points - target.points[:, contact], axis=1), 0.0)
+    k = int(misses.argmax())
+    return float(misses[k]), float(target.times[k])
+
+
 def passive_projector(jacobian: Array) -> Array:
     """(3, 3) onto the forces that no joint supplies, damped as eq. 2.23 is here."""
     normal_matrix = jacobian.T @ jacobian + NULL_SPACE_DAMPING**2 * np.eye(jacobian.shape[1])

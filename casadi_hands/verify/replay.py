@@ -8,8 +8,9 @@ start, while the squeeze builds up, and then lets go.
 
 Why this is fair to a real hand, as ``scene.xml`` has it:
 
-- *Motors* deflect by 10 mrad under the load that the finger may have to hold, and are critically damped: ordinary
-  geared servos are that stiff or stiffer. The hand carries its own weight, as a controller that knows its hand does.
+- *Motors* deflect by 50 mrad under the load that the finger may have to hold, and are critically damped: hobby
+  servos and tendon drives are about that stiff. The hand carries its own weight, as a controller that knows its
+  hand does.
 - *Contacts* are soft (a fingertip gives by a share of the object's size), with Coulomb friction of the task's
   coefficient and the small torsional friction of a patch of 0.3 of the fingertip's radius. The plan counts on neither
   softness nor torsion: rubber gives both for nothing, and without them a point contact spins freely.
