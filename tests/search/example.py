@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from casadi_hands.nlp import Solution
 from casadi_hands.stages.floating import Floating
 from casadi_hands.stages.model import build_model
 from casadi_hands.stages.synthesis import FingerSeed, Synthesised
 from casadi_hands.stages.target import Target, target_of
 from casadi_hands.task import Task, parse_task
+from tests.stages.example import made_up_solution
 
 BALL = """
 object: {mass: 0.1, shapes: [{sphere: {center: [0, 0, 0], radius: 0.03}}]}
@@ -41,6 +41,7 @@ def ball_target(squeeze: float = SQUEEZE) -> Target:
         active=np.ones((keyframes, 2), bool),
         activity=np.ones((keyframes, 2)),
         threshold=0.1,
+        solution=made_up_solution({}),
         runs=(),
     )
     return target_of(model, floating)
@@ -73,15 +74,5 @@ def pointing(target: Target, contact: int, axes: list[list[float]]) -> FingerSee
 def hand(fingers: list[FingerSeed], contacts: tuple[int, ...], objective: float = 1.0, **terms: float) -> Synthesised:
     """A solve's result, made up."""
     values = {"tip_target": 0.0, "null_space": 0.0, **terms}
-    solution = Solution(
-        values={},
-        terms=values,
-        objective=objective,
-        violation=0.0,
-        violations={},
-        constraints={},
-        status="Solve_Succeeded",
-        iterations=3,
-        seconds=0.01,
-    )
+    solution = made_up_solution({}, objective, **values)
     return Synthesised(tuple(fingers), contacts, solution, (("anneal 2", solution),))

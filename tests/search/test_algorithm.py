@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -62,7 +63,19 @@ def test_fingers_are_saturated_at_the_most_joints_and_named_if_short(monkeypatch
     MadeUp(monkeypatch, lambda h: [1.0, 0.0])
     found = search(ball_target(), max_joints=2).run()
     assert found.candidates[0].joints == (2, 1)
-    assert found.short == ("left",)
+    assert len(found.short) == 1
+    # The finger points straight up, beside its contact: how far is for the scores' tests to say.
+    assert re.fullmatch(
+        r"finger 'left' cannot reach its contact at 0\.6 s with 2 joint\(s\): it misses by \d+\.\d mm", found.short[0]
+    )
+
+
+def test_a_finger_that_reaches_but_cannot_press_is_said_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    MadeUp(monkeypatch, lambda h: [0.0, 1.0])
+    still = ball_target()
+    still.points[:] = still.points[0]
+    found = search(still, max_joints=1, trials=1).run()
+    assert found.short == ("finger 'right' cannot supply the force of its contact with 1 joint(s)",)
 
 
 def test_the_best_hand_s_scores_decide(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -129,7 +142,7 @@ def test_records_and_words(monkeypatch: pytest.MonkeyPatch) -> None:
     assert runs[0]["stage"] == "synthesis"
     assert runs[0]["seed"] == 4
     assert runs[0]["what"] == "finger left, 1 joints, trial 0"
-    assert words[2] == "synthesis  finger left, 1 joint(s), trial 3/3, best score 0.500"
+    assert words[2] == "finger left, 1 joint(s), trial 3/3, best score 0.500"
 
 
 def for_real(seed: int = 4) -> Found:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from casadi_hands.search.score import finger_scores, passive_projector
+from casadi_hands.search.score import finger_scores, passive_projector, worst_miss
 from casadi_hands.stages.target import Target
 from tests.search.example import ball_target, hand, pointing
 
@@ -81,3 +81,12 @@ def test_a_contact_counts_only_while_it_acts() -> None:
     # The right finger acts at the first keyframe alone, where it is at its contact.
     assert scores[1] == pytest.approx(0.5, abs=0.02)
     assert scores[0] > 50 * np.mean([0, 0.25**2, 0.5**2])
+
+
+def test_the_worst_miss_is_the_farthest_while_the_contact_acts() -> None:
+    # The contact moves away by 0.25 half extents a keyframe; keyframes are 0.3 s apart.
+    target = ball_target()
+    straight = hand([pointing(target, c, PUSH_ONLY) for c in (0, 1)], (0, 1))
+    np.testing.assert_allclose(worst_miss(target, straight, 0), (0.5, 0.6), atol=1e-9)
+    target.active[2, 1] = False
+    np.testing.assert_allclose(worst_miss(target, straight, 1), (0.25, 0.3), atol=1e-9)

@@ -11,7 +11,7 @@ import pinocchio as pin
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
-from casadi_hands.nlp import Solver
+from casadi_hands.nlp import Solution, Solver
 from casadi_hands.stages.floating import Floating
 from casadi_hands.stages.model import Model, build_model
 from casadi_hands.stages.synthesis import FingerSeed
@@ -92,6 +92,21 @@ def made_up_values(model: Model, seed: int = 0) -> dict[str, Array]:
     }
 
 
+def made_up_solution(values: dict[str, Array], objective: float = 1.0, **terms: float) -> Solution:
+    """What a solver returns, made up."""
+    return Solution(
+        values=values,
+        terms=terms,
+        objective=objective,
+        violation=0.0,
+        violations={},
+        constraints={},
+        status="Solve_Succeeded",
+        iterations=3,
+        seconds=0.01,
+    )
+
+
 def made_up_floating(model: Model, seed: int = 0) -> Floating:
     """The same with flags of 0 and 1; every finger lifts once, away from the ends."""
     values = made_up_values(model, seed)
@@ -106,6 +121,7 @@ def made_up_floating(model: Model, seed: int = 0) -> Floating:
         active=active,
         activity=values["activity"],
         threshold=0.2,
+        solution=made_up_solution(values),
         runs=(),
     )
 

@@ -182,6 +182,14 @@ class Case:
         parameters = object_parameters(self.model) | term_weights(self.stage.solver.problem, self.model, weights)
         return self.stage.solver.evaluate(self.values, parameters)
 
+    def constraints(self) -> Array:
+        """All constraints' values, in the order of the problem's rows."""
+        problem = self.stage.solver.problem
+        parameters = object_parameters(self.model) | term_weights(problem, self.model, self.weights)
+        x = problem.variables.pack(self.values, np.zeros(problem.variables.size))
+        p = problem.parameters.pack(parameters, np.zeros(problem.parameters.size))
+        return np.asarray(self.stage.solver.functions["nlp"](x, p)[1]).ravel()
+
 
 @pytest.fixture(scope="module")
 def full() -> Case:
@@ -203,6 +211,7 @@ MOTION_TERMS = [
     "path",
 ]
 ALL_TERMS = MOTION_TERMS + sorted(FORCE_TERMS) + sorted(f"{term}_perturbed" for term in FORCE_TERMS)
+CONTACTS = ("contact0", "contact1", "contact2")
 WEIGHT_OF = {
     "ground_friction_cone": "friction_cone",
     "contact_on_ground": "contact_on_object",
@@ -286,11 +295,39 @@ def test_activity_is_boxed_and_a_keyframe_keeps_two_contacts(full: Case) -> None
     lower, upper = (problem.variables.unpack(v)["activity"] for v in (problem.lower, problem.upper))
     assert (lower == 0).all()
     assert (upper == 1).all()
-    assert problem.constraints.names() == ["enough_contacts"]
-    assert set(problem.constraint_lower) == {2}
-    x = problem.variables.pack(full.values, np.zeros(problem.variables.size))
-    sums = np.asarray(full.stage.solver.functions["nlp"](x, np.ones(problem.parameters.size))[1]).ravel()
+    rows = problem.constraint_rows["enough_contacts.sum"]
+    assert set(problem.constraint_lower[rows].ravel()) == {2}
+    assert set(problem.constraint_upper[rows].ravel()) == {np.inf}
+    sums = full.constraints()[rows].ravel()
     np.testing.assert_allclose(sums, full.values["activity"].sum(axis=1), atol=1e-12)
+
+
+@pytest.mark.parametrize("suffix", ["", "_perturbed"])
+def test_every_contact_force_is_held_in_its_cone(full: Case, suffix: str) -> None:
+    model, problem, witness = full.model, full.stage.solver.problem, Witness(full.model, full.values)
+    assert model.ground is not None
+    orientations, constraints = witness.motion.at(0)[1], full.constraints()
+    for c, name in enumerate((*CONTACTS, "ground")):
+        rows = problem.constraint_rows[f"{name}{suffix}.in_cone"]
+        assert set(problem.constraint_lower[rows].ravel()) == {0}
+        assert set(problem.constraint_upper[rows].ravel()) == {np.inf}
+        margins = []
+        for s, turn in enumerate(orientations):
+            force, friction = witness.forces[suffix][s, c], model.friction
+            if name == "ground":
+                inward, friction = turn.inv().apply([0, 0, 1]), model.ground.friction
+            else:
+                inward = -project(witness.points[1][s, c], model.capsules[c])[1]
+            across = np.linalg.norm(np.cross(force, inward))
+            # Rounded to the safe side where nothing acts across the normal.
+            margins.append(friction * force @ inward - np.hypot(across, 1e-3))
+        assert np.ptp(margins) > 1
+        np.testing.assert_allclose(constraints[rows].ravel(), margins, atol=2e-4)
+
+
+def test_there_are_no_other_constraints(full: Case) -> None:
+    cones = [f"{name}{suffix}.in_cone" for suffix in ("", "_perturbed") for name in (*CONTACTS, "ground")]
+    assert sorted(full.stage.solver.problem.constraint_rows) == sorted([*cones, "enough_contacts.sum"])
 
 
 def test_poses_are_held_close_to_their_goals_only(full: Case) -> None:
