@@ -1,0 +1,111 @@
+"""Solve tasks by the thesis's own stages, without refinement, and print how exact the soft costs alone get.
+
+    python scripts/soft_figures.py problems/horizontal_translation.yaml --seeds 0 1 2 3 4
+
+Everything is measured on the files of the results, which stay in ``--out`` and are not solved again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+
+import numpy as np
+from shared import SEEDS, joints_of, kept_solve, write_table
+
+from casadi_hands.verify.clearance import penetration_figure
+from casadi_hands.verify.contact import Placements, active_contacts, surface_normals
+from casadi_hands.verify.dynamics import sample_residual, shoot
+from casadi_hands.verify.folder import Folder, read_folder
+from casadi_hands.verify.goals import goal_figures
+from casadi_hands.verify.trajectory import build_trajectory, sample_placements
+
+HEAD = (
+    "task",
+    "seed",
+    "joints",
+    "goals mm / deg",
+    "contact from object mm",
+    "contact from finger mm",
+    "penetration mm",
+    "friction excess on object (m·g)",
+    "residual force (m·g)",
+    "residual torque (m·g·l)",
+    "s in all",
+)
+
+
+def main() -> None:
+    """Measure every task with every seed."""
+    parser = argparse.ArgumentParser(
+        description=__doc__.partition("\n")[0], formatter_class=argparse.ArgumentDefaultsHelpFormatter
+    )
+    parser.add_argument("tasks", metavar="TASK", nargs="+", type=Path, help="task files")
+    parser.add_argument("--seeds", nargs="+", type=int, default=list(SEEDS), help="seeds of the search")
+    parser.add_argument("--out", type=Path, default=Path("results/measured"), help="folder for the results")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes")
+    given = parser.parse_args()
+    rows = []
+    for task in given.tasks:
+        for seed in given.seeds:
+            design, path = kept_solve(task, seed, "whole_hand", given.out, given.jobs)
+            figures = soft_figures(read_folder(path))
+            rows.append([design.task.name, str(seed), joints_of(design), *figures, f"{design.seconds['total']:.0f}"])
+            write_table(HEAD, rows, given.out / "soft.md")
+
+
+def soft_figures(folder: Folder) -> list[str]:
+    """The figures between ``joints`` and the time in ``HEAD``, each the worst over the motion."""
+    placed, shots = sample_placements(folder), shoot(folder)
+    goals = {figure.name: figure.value for figure in goal_figures(folder)}
+    from_object, from_finger = contact_distances(folder, placed)
+    penetration = penetration_figure(folder, build_trajectory(folder, shots)).value
+    force, torque = sample_residual(folder, shots)
+    return [
+        f"{1e3 * goals['goal_position']:.2f} / {goals.get('goal_angle', np.nan):.2f}",
+        f"{1e3 * from_object:.2f}",
+        f"{1e3 * from_finger:.2f}",
+        f"{1e3 * penetration:.2f}",
+        f"{friction_excess_on_object(folder, placed):.3f}",
+        f"{force.max():.3f}",
+        f"{torque.max():.3f}",
+    ]
+
+
+def contact_distances(folder: Folder, placed: Placements) -> tuple[float, float]:
+    """Largest distance (m) of an active contact's two stored points from the object's and from the link's surface.
+
+    The ground's contact is left out: it has no finger.
+    """
+    motion, from_object, from_finger = folder.motion, 0.0, 0.0
+    for k, c in active_contacts(folder):
+        link = motion.contact_link[c]
+        if link == "ground":
+            continue
+        object_rotation, object_position = (each[k] for each in placed["object"])
+        link_rotation, link_position = (each[k] for each in placed[link])
+        for world in (
+            object_rotation @ motion.contact_point_object[k, c] + object_position,
+            link_rotation @ motion.contact_point_link[k, c] + link_position,
+        ):
+            in_object = object_rotation.T @ (world - object_position)
+            in_link = link_rotation.T @ (world - link_position)
+            from_object = max(from_object, abs(folder.object.surface_distance(in_object)))
+            from_finger = max(from_finger, abs(folder.links[link].surface_distance(in_link)))
+    return from_object, from_finger
+
+
+def friction_excess_on_object(folder: Folder, placed: Placements) -> float:
+    """Largest tangential force beyond friction times normal force on the object's surface, over the weight."""
+    excess = -np.inf
+    for k, c in active_contacts(folder):
+        force, outward = folder.motion.contact_force[k, c], surface_normals(folder, placed, k, c)[0]
+        normal = -float(force @ outward)
+        tangential = float(np.linalg.norm(force + normal * outward))
+        excess = max(excess, (tangential - folder.friction(c) * max(normal, 0.0)) / folder.weight)
+    return excess
+
+
+if __name__ == "__main__":
+    main()
