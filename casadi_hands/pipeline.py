@@ -38,6 +38,7 @@ FEASIBLE = {  # beyond these a motion is none: m, degrees, m·g
     "gap": 0.001,
     "penetration": 0.002,
 }
+OUT_OF_REACH = 0.3  # half extents that a finger misses its contact by: nothing is left to refine
 HANDS_REFINED = 2  # hands of one structure that are tried before fingers get another joint
 
 _CONSTRAINTS = {  # what a violated constraint means
@@ -189,6 +190,9 @@ class _Run:
     def _refine(self, floating: Floating, search: Search, found: Found) -> Design:
         """Refine hands until one is certified: the best, the next best, then with one more joint where it fails."""
         best: tuple[int, Design] | None = None
+        if found.farthest > OUT_OF_REACH:
+            self._whole_hand(floating, found.candidates[0])
+            return self._judge(self.design, "; ".join(found.short))
         while True:
             failing: set[str] = set()
             for candidate in found.candidates[:HANDS_REFINED]:
@@ -268,7 +272,7 @@ class _Run:
         certificate = verdict.as_certificate()
         if verdict.certified:
             return replace(design, status="certified", reason="", certificate=certificate)
-        text = "; ".join([*([reason] if reason else []), *verdict.reasons])
+        text = reason or "; ".join(verdict.reasons)
         values = {name: certificate[name]["value"] for name in FEASIBLE if name in certificate}
         possible = all(value is not None and value <= FEASIBLE[name] for name, value in values.items())
         return replace(design, status="feasible" if possible else "failed", reason=text, certificate=certificate)

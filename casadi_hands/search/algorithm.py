@@ -45,10 +45,12 @@ class Found:
 
     Attributes:
         candidates: hands of the last round, best objective first.
+        farthest: how far the worst of those fingers is from its contact, half extents.
         short: why fingers stayed above the threshold at the most joints allowed, one sentence each.
     """
 
     candidates: tuple[Candidate, ...]
+    farthest: float
     short: tuple[str, ...]
 
 
@@ -99,8 +101,9 @@ class Search:
             scores = dict(zip(self.contacts, best.scores, strict=True))
             growing = {c for c in self.contacts if joints[c] < self.max_joints and scores[c] >= self.threshold}
             if not growing:
-                short = tuple(self._shortcoming(best, c) for c in self.contacts if scores[c] >= self.threshold)
-                return Found(tuple(candidates), short)
+                lacking = [c for c in self.contacts if scores[c] >= self.threshold]
+                farthest = max((worst_miss(self.target, best.hand, c)[0] for c in lacking), default=0.0)
+                return Found(tuple(candidates), farthest, tuple(self._shortcoming(best, c) for c in lacking))
             for c in growing:
                 joints[c] += 1
 
