@@ -24,7 +24,7 @@ from casadi_hands.stages.object_side import (
 
 Array = NDArray[np.float64]
 THRESHOLDS = (0.1, 0.2, 0.3)
-OPTIONS = Options(max_iter=300, tol=1e-4, acceptable_tol=1e-3)
+OPTIONS = Options(max_iter=300, tol=1e-4, acceptable_tol=1e-3, extra=(("mu_strategy", "adaptive"),))
 
 
 @dataclass(frozen=True)

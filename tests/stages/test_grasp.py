@@ -42,7 +42,7 @@ def ball(*elevations: float, gravity: float = -9.81, friction: float = 0.5) -> M
 
 
 def plan(model: Model, *active: int, pose: np.ndarray | None = None) -> dict[str, np.ndarray]:
-    """Contacts where the task has them, with these flags (all 1 by default); the object stands still but for ``pose``."""
+    """Contacts where the task has them, with these flags (1 by default); the object stands still but for ``pose``."""
     keyframes = len(model.schedule.keyframes)
     return {
         "pose": np.zeros((keyframes, 6)) if pose is None else pose,
