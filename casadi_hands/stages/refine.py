@@ -24,11 +24,11 @@ from casadi_hands.stages.whole_hand import WholeHand
 Array = NDArray[np.float64]
 _EXACT = (("nlp_scaling_method", "none"), ("mu_strategy", "adaptive"))
 SOFT = Options(max_iter=150, tol=1e-3, acceptable_tol=1e-2, constr_viol_tol=1e-6, mu_init=1e-2, extra=_EXACT)
-HARD = Options(max_iter=200, tol=1e-6, acceptable_tol=1e-5, constr_viol_tol=1e-10, mu_init=1e-2, extra=_EXACT)
+HARD = Options(max_iter=150, tol=1e-6, acceptable_tol=1e-5, constr_viol_tol=1e-10, mu_init=1e-2, extra=_EXACT)
 JOINT_MARGIN = 0.005  # rad, so that a smooth curve through the knots stays within the limits between them
 CLEARANCE = 0.02  # half extents, asked of bodies that do not touch
 ACCEPTED = 1e-7  # largest violation with which a refined motion is handed on
-HOPELESS = 0.3  # half extents of slip that a firm solve leaves when rolling is out of a structure's reach
+HOPELESS = 0.05  # half extents of slip: where a firm solve leaves more, rolling is out of the structure's reach
 Bounds = dict[str, tuple[ArrayLike, ArrayLike]]
 _FREE = (-np.inf, np.inf)
 
