@@ -102,7 +102,6 @@ def test_forces_balance(solved: Solved) -> None:
         assert np.linalg.norm(residual) < 5e-2
 
 
-@pytest.mark.xfail(reason="the cone is one cost among many here and bends outwards", strict=True)
 def test_friction_on_the_object_is_kept(solved: Solved) -> None:
     model, result = solved.model, solved.result
     excess = []
@@ -110,7 +109,7 @@ def test_friction_on_the_object_is_kept(solved: Solved) -> None:
         inward = -project(result.point[s, contact], model.capsules[contact])[1]
         pressing = result.force[s, contact] @ inward
         excess.append(np.linalg.norm(result.force[s, contact] - pressing * inward) - model.friction * pressing)
-    assert max(excess) <= 0
+    assert max(excess) <= 1e-6
 
 
 def test_joints_keep_their_limits_at_keyframes(solved: Solved) -> None:

@@ -1,0 +1,241 @@
+"""From a task to a folder: every stage alone, tasks that cannot be done, and (slow) a whole task of the thesis."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from ruamel.yaml import YAML
+from typer.testing import CliRunner
+
+from casadi_hands import Design, load_task, solve
+from casadi_hands.cli.app import app
+from casadi_hands.errors import SolveError
+from casadi_hands.kinematics import finger_kinematics
+from casadi_hands.pipeline import STAGES, Progress
+from casadi_hands.task import Task, parse_task
+from casadi_hands.task.limits import Limits
+from casadi_hands.verify import audit
+from tests.stages.test_model import scaled
+
+PROBLEMS = Path(__file__).parents[1] / "problems"
+CAPSULE = PROBLEMS / "horizontal_translation.yaml"
+ALWAYS = {"result.json", "task.yaml", "motion.npz", "object.urdf"}
+OF_A_HAND = {"hand.urdf", "scene.xml", "viewer.html"}
+# Two fingers carry a ball 1.5 cm to the side, above a palm that looks up.
+BALL = """
+name: ball
+object: {mass: 0.1, shapes: [{sphere: {center: [0, 0, 0], radius: 0.03}}]}
+palm: {radius: 0.06, position: [0, 0, 0], facing: [0, 0, 1], up: [1, 0, 0]}
+motion: [{at: 0, position: [0, 0, 0.09]}, {at: 0.6, position: [0, 0.015, 0.09]}]
+fingers: {left: {touches: [0, -0.03, 0]}, right: {touches: [0, 0.03, 0]}}
+friction: 0.5
+keyframes_between: 1
+search: {trials: 2, recombinations: 1, max_joints: 2}
+"""
+
+
+LIMITS_IN_METRES = ("goal_position", "gap", "gap_between", "slip", "penetration")
+
+
+def files(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+@pytest.mark.parametrize("stage", STAGES[:-1])
+def test_a_solve_stops_where_it_is_told_and_leaves_a_folder(stage: str, tmp_path: Path) -> None:
+    news: list[Progress] = []
+    design = solve(parse_task(BALL), jobs=1, until=stage, out=tmp_path, progress=news.append)
+    done = STAGES[: STAGES.index(stage) + 1]
+    assert tuple(dict.fromkeys(word.stage for word in news)) == done
+    assert [word.elapsed for word in news] == sorted(word.elapsed for word in news)
+    loaded = Design.load(tmp_path)
+    assert (loaded.status, loaded.reason) == (design.status, design.reason)
+    assert set(loaded.costs) == set(done)
+    assert {run["stage"] for run in loaded.stages} == set(done)
+    assert set(loaded.seconds) == {*done, "total"}
+    assert (loaded.hand is None) == (stage == "floating")
+    assert (loaded.motion is None) == (stage == "synthesis")
+    if stage == "whole_hand":
+        assert files(tmp_path) >= ALWAYS | OF_A_HAND
+        assert loaded.certificate == audit(tmp_path).as_certificate()
+    else:
+        assert loaded.reason == f"stopped after the stage {stage}, as asked"
+
+
+def test_an_unknown_stage_is_refused() -> None:
+    with pytest.raises(SolveError, match="until: given 'refined'; allowed: floating, synthesis, whole_hand, refine"):
+        solve(parse_task(BALL), until="refined")
+
+
+@pytest.fixture(scope="module")
+def carried(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("carried")
+    solve(parse_task(BALL), jobs=1, out=folder)
+    return folder
+
+
+def test_a_small_task_is_certified_from_its_files(carried: Path) -> None:
+    design, verdict = Design.load(carried), audit(carried)
+    assert files(carried) == ALWAYS | OF_A_HAND
+    assert verdict.reasons == []
+    assert verdict.certified
+    assert (design.status, design.reason) == ("certified", "")
+    assert design.certificate == verdict.as_certificate()
+    assert set(design.seconds) == {*STAGES, "total"}
+    assert sum(design.seconds[stage] for stage in STAGES) == pytest.approx(design.seconds["total"], rel=0.5)
+    for stage in STAGES:
+        objective = [run["objective"] for run in design.stages if run["stage"] == stage]
+        total = sum(term["value"] for term in design.costs[stage].values())
+        assert any(total == pytest.approx(value, rel=1e-6) for value in objective), stage
+
+
+def test_a_task_as_solved_solves_to_the_same_motion(carried: Path, tmp_path: Path) -> None:
+    solve(load_task(carried / "task.yaml"), jobs=1, out=tmp_path)
+    assert (tmp_path / "motion.npz").read_bytes() == (carried / "motion.npz").read_bytes()
+
+
+def check_kinematics(folder: Path) -> None:
+    """The exported hand, in Pinocchio, has its fingertips where the tool's own kinematics has them."""
+    model = pin.buildModelFromUrdf(str(folder / "hand.urdf"))
+    data, motion = model.createData(), np.load(folder / "motion.npz")
+    hand = Design.load(folder).hand
+    assert hand is not None
+    names = motion["joint_names"].tolist()
+    order = [model.joints[model.getJointId(name)].idx_q for name in names]
+    for angles in motion["joint_angles"]:
+        q = np.zeros(model.nq)
+        q[order] = angles
+        pin.framesForwardKinematics(model, data, q)
+        for i, finger in enumerate(hand.fingers):
+            own = [angles[names.index(f"finger{i}_joint{j}")] for j in range(len(finger.links))]
+            lengths, axes = [link.length for link in finger.links], np.array([link.axis for link in finger.links]).T
+            tip = np.asarray(finger_kinematics(len(own))(finger.base, axes, lengths, own, np.zeros(3))[2]).ravel()
+            last = data.oMf[model.getFrameId(f"finger{i}_link{len(own) - 1}")]
+            np.testing.assert_allclose(last.act(np.array([0, 0, lengths[-1]])), tip, atol=1e-9)
+
+
+def test_the_exported_hand_has_its_fingertips_where_the_tool_has_them(carried: Path) -> None:
+    check_kinematics(carried)
+
+
+# What cannot be done ends with a reason, and keeps what was computed.
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        # Two links of 2 cm do not span 9 cm.
+        (
+            ["hand: {link_length: [0.016, 0.02]}"],
+            r"finger 'left' cannot reach its contact at [\d.]+ s with 2 joint\(s\): it misses by [345]\d\.\d mm",
+        ),
+        # A second goal 40 cm from the palm for fingers of 10 cm.
+        (
+            ["hand: {link_length: [0.016, 0.05]}", "[0, 0.015, 0.09] -> [0, 0.4, 0.09]"],
+            r"finger 'right' cannot reach its contact at 0\.6 s with 2 joint\(s\): it misses by [23]\d\d\.\d mm",
+        ),
+    ],
+)
+def test_a_contact_out_of_reach_fails_the_task(changes: list[str], reason: str, tmp_path: Path) -> None:
+    text = BALL
+    for change in changes:
+        old, _, new = change.partition(" -> ")
+        text = text.replace(old, new) if new else text + old + "\n"
+    (tmp_path / "task.yaml").write_text(text)
+    result = CliRunner().invoke(
+        app, ["solve", str(tmp_path / "task.yaml"), "--out", str(tmp_path / "out"), "--jobs", "1"]
+    )
+    assert result.exit_code == 1
+    design = Design.load(tmp_path / "out")
+    assert design.status == "failed"
+    assert design.certificate["gap"]["value"] > 0.03
+    assert not design.certificate["gap"]["holds"]
+    assert files(tmp_path / "out") == ALWAYS | OF_A_HAND
+    sentences = design.reason.split("; ")
+    assert all(sentence.startswith("finger '") for sentence in sentences)
+    assert any(re.fullmatch(reason, sentence) for sentence in sentences), design.reason
+
+
+@pytest.mark.parametrize(
+    ("limit", "figures"),
+    [
+        # Half the weight at 6 cm and more is 30 mN·m.
+        ("actuator: {torque: 0.0005, speed: 5}", {"torque", "unsupplied_force"}),
+        ("search: {trials: 2, recombinations: 1, max_joints: 1}", {"slip"}),
+    ],
+)
+def test_a_motion_beyond_a_limit_is_not_certified(limit: str, figures: set[str], tmp_path: Path) -> None:
+    text = "\n".join(line for line in BALL.splitlines() if line.split(":")[0] != limit.split(":")[0])
+    design = solve(parse_task(f"{text}\n{limit}\n"), jobs=1, out=tmp_path)
+    assert design.status in ("feasible", "failed")
+    assert "finger '" in design.reason
+    assert {name for name, figure in design.certificate.items() if not figure["holds"]} & figures
+    assert files(tmp_path) == ALWAYS | OF_A_HAND
+    assert Design.load(tmp_path).reason == design.reason
+
+
+# Figure 3.6b as it is, from the thesis's pages.
+
+
+@pytest.fixture(scope="module")
+def translated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("translated")
+    solve(load_task(CAPSULE), jobs=1, out=folder)
+    return folder
+
+
+@pytest.mark.slow
+def test_a_capsule_s_translation_is_certified_with_two_joints_a_finger(translated: Path) -> None:
+    design, verdict = Design.load(translated), audit(translated)
+    assert verdict.reasons == []
+    assert verdict.certified
+    assert design.status == "certified"
+    assert design.hand is not None
+    assert [len(finger.links) for finger in design.hand.fingers] == [2, 2, 2]
+    check_kinematics(translated)
+
+
+@pytest.mark.slow
+def test_two_jobs_give_the_very_motion_of_one(translated: Path, tmp_path: Path) -> None:
+    solve(load_task(CAPSULE), jobs=2, out=tmp_path)
+    assert (tmp_path / "motion.npz").read_bytes() == (translated / "motion.npz").read_bytes()
+
+
+def ten_times_larger() -> Task:
+    data = YAML(typ="safe").load(CAPSULE)
+    data["gravity"] = [0, 0, -9.81]
+    data["limits"] = {name: 10 * getattr(Limits(), name) for name in LIMITS_IN_METRES}
+    return parse_task(json.dumps(scaled(data, 10.0)))
+
+
+@pytest.mark.slow
+def test_ten_times_larger_gives_the_same_hand_ten_times_larger(translated: Path, tmp_path: Path) -> None:
+    design = solve(ten_times_larger(), jobs=1, out=tmp_path)
+    small = Design.load(translated)
+    assert small.hand is not None
+    assert design.hand is not None
+    assert (design.status, design.reason) == ("certified", "")
+    for one, other in zip(small.hand.fingers, design.hand.fingers, strict=True):
+        np.testing.assert_allclose(np.array(other.base), 10 * np.array(one.base), rtol=1e-6, atol=1e-9)
+        axes = [np.array([link.axis for link in finger.links]) for finger in (one, other)]
+        np.testing.assert_allclose(axes[1], axes[0], atol=1e-6)
+        lengths = [np.array([link.length for link in finger.links]) for finger in (one, other)]
+        np.testing.assert_allclose(lengths[1], 10 * lengths[0], rtol=1e-6)
+    motions = [np.load(folder / "motion.npz") for folder in (translated, tmp_path)]
+    np.testing.assert_allclose(motions[1]["object_position"], 10 * motions[0]["object_position"], rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(motions[1]["joint_angles"], motions[0]["joint_angles"], atol=1e-6)
+
+
+@pytest.mark.slow
+def test_almost_no_friction_is_not_certified(tmp_path: Path) -> None:
+    text = CAPSULE.read_text().replace("friction: 0.6", "friction: 0.05")
+    task = parse_task(text + "search: {trials: 2, recombinations: 1, max_joints: 2}\n")
+    design = solve(task, jobs=1, out=tmp_path)
+    assert design.status in ("feasible", "failed")
+    assert "finger '" in design.reason or "friction" in design.reason
+    assert files(tmp_path) == ALWAYS | OF_A_HAND
