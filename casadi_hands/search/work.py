@@ -49,10 +49,9 @@ def combine_fingers(
 
 
 @contextmanager
-def processes(jobs: int | None) -> Iterator[Executor | None]:
-    """An executor of ``jobs`` processes (all cores by default), one thread of linear algebra each; None for one."""
-    count = jobs or os.cpu_count() or 1
-    if count == 1:
+def processes(jobs: int) -> Iterator[Executor | None]:
+    """An executor of ``jobs`` processes, one thread of linear algebra each; None for one."""
+    if jobs == 1:
         yield None
         return
     saved = {name: os.environ.get(name) for name in _THREADS}
@@ -61,7 +60,7 @@ def processes(jobs: int | None) -> Iterator[Executor | None]:
         context = multiprocessing.get_context("spawn")
         # An interrupt is the parent's to handle: workers end with it, silently.
         with ProcessPoolExecutor(
-            count, mp_context=context, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)
+            jobs, mp_context=context, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)
         ) as executor:
             yield executor
     finally:

@@ -22,13 +22,16 @@ from casadi_hands.stages.synthesis import AXIS_RANGE
 from casadi_hands.stages.whole_hand import WholeHand
 
 Array = NDArray[np.float64]
-_EXACT = (("nlp_scaling_method", "none"), ("mu_strategy", "adaptive"))
-SOFT = Options(max_iter=150, tol=1e-3, acceptable_tol=1e-2, constr_viol_tol=1e-6, mu_init=1e-2, extra=_EXACT)
-HARD = Options(max_iter=150, tol=1e-6, acceptable_tol=1e-5, constr_viol_tol=1e-10, mu_init=1e-2, extra=_EXACT)
+_FAR = (("nlp_scaling_method", "none"), ("mu_strategy", "adaptive"))
+_NEAR = (("nlp_scaling_method", "none"), ("bound_push", 1e-6), ("bound_frac", 1e-6))
+# The first solve starts far from a solution; from then on an adaptive barrier was seen to leap away from a good start.
+SOFT = Options(max_iter=150, tol=1e-3, acceptable_tol=1e-2, constr_viol_tol=1e-6, mu_init=1e-2, extra=_FAR)
+CLOSER = Options(max_iter=100, tol=1e-3, acceptable_tol=1e-2, constr_viol_tol=1e-6, mu_init=1e-3, extra=_NEAR)
+HARD = Options(max_iter=150, tol=1e-6, acceptable_tol=1e-5, constr_viol_tol=1e-10, mu_init=1e-3, extra=_NEAR)
 JOINT_MARGIN = 0.005  # rad, so that a smooth curve through the knots stays within the limits between them
 CLEARANCE = 0.02  # half extents, asked of bodies that do not touch
 ACCEPTED = 1e-7  # largest violation with which a refined motion is handed on
-HOPELESS = 0.05  # half extents of slip: where a firm solve leaves more, rolling is out of the structure's reach
+HOPELESS = 0.1  # half extents of slip: where a firm solve leaves more, rolling is out of the structure's reach
 Bounds = dict[str, tuple[ArrayLike, ArrayLike]]
 _FREE = (-np.inf, np.inf)
 
@@ -44,7 +47,7 @@ class Margin:
     """
 
     friction: float = 0.5
-    normal_force: float = 0.6
+    normal_force: float = 1.0
     passive: float = 0.009
 
 
@@ -265,7 +268,7 @@ class RefineStage:
         runs: list[tuple[str, Solution]] = []
         for what, weights, hard, options in (
             ("soft", WEIGHTS, Bounds(), SOFT),
-            ("firm", WEIGHTS | FIRM, Bounds(), SOFT),
+            ("firm", WEIGHTS | FIRM, Bounds(), CLOSER),
             ("exact", WEIGHTS, roll | supply, HARD),
         ):
             weighted: dict[str, ArrayLike] = {

@@ -19,6 +19,7 @@ Why this is fair to a real hand, as ``scene.xml`` has it:
 
 from __future__ import annotations
 
+import multiprocessing
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -112,5 +113,6 @@ def replay_many(directory: str | Path, n: int, seed: int = 0, jobs: int = 1) -> 
     drawn = [draw_perturbation(folder, seed, number) for number in range(n)]
     if jobs == 1:
         return [replay(directory, each) for each in drawn]
-    with ProcessPoolExecutor(jobs) as pool:
+    # Forking a process that runs threads (a progress display, a solver) can hang it.
+    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
         return list(pool.map(partial(replay, directory), drawn))
