@@ -224,15 +224,16 @@ class _Run:
         joints = tuple(finger.joints for finger in whole.fingers)
         with self._stage("refine", "the same motion with exact physics, rolling contacts and clearance"):
             stage = RefineStage(self.model, whole.contacts, joints, whole.active)
-            refined = stage.solve(whole, AMPLE)
+            refined = self._attempt(stage, whole, AMPLE)
         if not refined.exact and not refined.slips_hopelessly:
             with self._stage("refine", "again, closer to the limits of friction and grip"):
-                refined = self._better(refined, stage.solve(whole, SMALL))
+                second = self._attempt(stage, whole, SMALL)
+            refined = second if second.exact or second.worst[1] < refined.worst[1] else refined
         judged = self._judged(refined, short)
         drops = self._drops(judged)
         if drops > DROPS:
             with self._stage("refine", f"again with a firmer grip: {drops} of {REPLAYS} replays dropped the object"):
-                firmer = stage.solve(whole, FIRM)
+                firmer = self._attempt(stage, whole, FIRM)
             again = self._judged(firmer, short)
             if again.status == "certified" and self._drops(again) < drops:
                 return again, firmer
@@ -250,17 +251,25 @@ class _Run:
                 return REPLAYS
             return sum(r.dropped for r in replay_many(scratch, REPLAYS, jobs=self.jobs))
 
-    def _better(self, first: Refined, second: Refined) -> Refined:
-        return second if second.exact or second.worst[1] < first.worst[1] else first
+    def _attempt(self, stage: RefineStage, whole: WholeHand, margin: Margin) -> Refined:
+        """Refine with one margin, and record its solves whether they serve or not."""
+        result = stage.solve(whole, margin)
+        what = f"hand, {margin.friction:g} of the friction and {margin.normal_force:g} weights of grip"
+        runs = [run_record("refine", what, self.task.search.seed, step, s) for step, s in result.runs]
+        length = self.model.units.length
+        # What the refinement changed in each finger: base and lengths in m, axes in rad.
+        runs[-1]["design_change"] = {
+            finger: {"base": change["base"] * length, "lengths": change["lengths"] * length, "axes": change["axes"]}
+            for finger, change in result.moved.items()
+        }
+        self.design = replace(self.design, stages=[*self.design.stages, *runs])
+        return result
 
     def _judged(self, refined: Refined, short: tuple[str, ...]) -> Design:
         """Adopt a refined hand and have it audited; ``short`` says what its fingers could not do before."""
-        runs = [run_record("refine", "hand", self.task.search.seed, what, s) for what, s in refined.runs]
         last = refined.runs[-1][1]
         costs = {name: {"weight": WEIGHTS[name], "value": value} for name, value in last.terms.items()}
-        self.design = replace(
-            self.design, stages=[*self.design.stages, *runs], costs={**self.design.costs, "refine": costs}
-        )
+        self.design = replace(self.design, costs={**self.design.costs, "refine": costs})
         self._adopt(refined.hand)
         reasons = [*short, *filter(None, [_reason(self.model, refined)])]
         return self._judge(self.design, "; ".join(reasons))
