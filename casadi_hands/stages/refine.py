@@ -367,7 +367,9 @@ class RefineStage:
     def _result(self, start: WholeHand, runs: list[tuple[str, Solution]], slips: dict[str, float]) -> Refined:
         solution = runs[-1][1]
         values, count = solution.values, len(self.model.schedule.samples)
-        point, force = start.point.copy(), start.force.copy()
+        # Fingers alone carry the refined motion; a ground contact of the soft stages ends here.
+        point, force, active = start.point.copy(), np.zeros_like(start.force), np.zeros_like(start.active)
+        active[:, list(self.contacts)] = self.active
         point[:, list(self.contacts)] = values["point"].reshape(count, -1, 3)
         force[:, list(self.contacts)] = values["force"].reshape(count, -1, 3)
         fingers, moved = [], {}
@@ -394,6 +396,7 @@ class RefineStage:
             vector=values["pose"][:, 3:],
             point=point,
             force=force,
+            active=active,
             solution=solution,
         )
         worst = max(solution.violations.items(), key=lambda item: item[1])
