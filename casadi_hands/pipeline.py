@@ -300,7 +300,9 @@ class _Run:
         certificate = verdict.as_certificate()
         if verdict.certified:
             return replace(design, status="certified", reason="", certificate=certificate)
-        text = reason or "; ".join(verdict.reasons)
+        # What the motors could not do is never hidden by what a stage could not reach because of it.
+        motors = [f.reason for name, f in verdict.figures.items() if name in ("speed", "torque") and not f.holds]
+        text = "; ".join([reason, *motors]) if reason else "; ".join(verdict.reasons)
         values = {name: certificate[name]["value"] for name in FEASIBLE if name in certificate}
         possible = all(value is not None and value <= FEASIBLE[name] for name, value in values.items())
         return replace(design, status="feasible" if possible else "failed", reason=text, certificate=certificate)
