@@ -1,6 +1,8 @@
-"""Kernels as machine code: C from CasADi, a C compiler, and a cache on disk keyed by content.
+"""Kernels as machine code: C from CasADi, a C compiler, and a cache on disk that is checked before it is used.
 
-Interpreted kernels give the same numbers, several times slower; they serve where there is no compiler.
+Beside each library lies a record of its content. A library that does not match its record is never mapped: a
+truncated one would end the process with SIGBUS, which Python cannot catch. Interpreted kernels give the same
+numbers, several times slower; they serve where nothing can be compiled or kept.
 """
 
 from __future__ import annotations
@@ -10,8 +12,10 @@ import fcntl
 import hashlib
 import logging
 import os
+import platform
 import shutil
 import subprocess
+import sys
 import tempfile
 from collections.abc import Iterator
 from functools import cache
@@ -24,6 +28,7 @@ log = logging.getLogger(__name__)
 # No contraction of a*b+c: a compiled kernel rounds as the interpreted one does.
 _FLAGS = ("-fPIC", "-shared", "-ffp-contract=off")
 _LARGE = 20_000  # instructions beyond which optimising takes longer than it will ever save
+_reported: set[type[Exception]] = set()
 
 
 @cache
@@ -37,54 +42,131 @@ def compiler() -> str | None:
 
 
 def cache_folder() -> Path:
-    """Where compiled kernels are kept: ``$CASADI_HANDS_CACHE``, else the user's cache folder."""
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    folder = Path(os.environ.get("CASADI_HANDS_CACHE") or Path(base) / "casadi-hands")
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
+    """Where compiled kernels are kept: ``$CASADI_HANDS_CACHE``, else the user's cache folder.
+
+    Raises:
+        RuntimeError: the user has no home folder.
+    """
+    named = os.environ.get("CASADI_HANDS_CACHE")
+    if named:
+        # The loader searches its own path for a bare file name, so the folder has to be absolute.
+        return Path(named).absolute()
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache").absolute() / "casadi-hands"
 
 
 def compiled(name: str, functions: dict[str, Function]) -> dict[str, Function]:
-    """The same functions as machine code, or as they are where they cannot be compiled.
+    """The same functions as machine code, or as they are where they cannot be compiled, kept or loaded.
 
     Args:
         name: of the kernel, for the log.
         functions: by role; each with a CasADi name of its own.
     """
-    if compiler() is None:
+    c_compiler = compiler()
+    if c_compiler is None:
         return functions
-    content = "\n".join(function.serialize() for function in functions.values())
     flags = ("-O0" if sum(f.n_instructions() for f in functions.values()) > _LARGE else "-O1", *_FLAGS)
-    key = hashlib.sha256("|".join((content, ca.CasadiMeta.version(), *flags)).encode()).hexdigest()[:24]
     try:
-        library = cache_folder() / f"{key}.so"
-        if not library.exists():
+        library = cache_folder() / f"{_key(functions, c_compiler, flags)}.so"
+        if not _intact(library):
+            library.parent.mkdir(parents=True, exist_ok=True)
             with _locked(library.with_suffix(".lock")):
-                if not library.exists():
-                    _build(functions, library, flags)
+                _build_unless_intact(name, functions, library, (c_compiler, *flags))
         return {role: ca.external(function.name(), str(library)) for role, function in functions.items()}
     except (OSError, subprocess.SubprocessError, RuntimeError) as error:
-        log.warning("kernel '%s' is interpreted, it could not be compiled: %s", name, error)
+        _report(name, error)
         return functions
 
 
-def _build(functions: dict[str, Function], library: Path, flags: tuple[str, ...]) -> None:
-    """Write C, compile it, and put the library in place in one step."""
-    with tempfile.TemporaryDirectory(dir=library.parent) as scratch:
-        generator = ca.CodeGenerator("kernel.c")
-        for function in functions.values():
-            generator.add(function)
-        generator.generate(scratch + os.sep)
-        built = Path(scratch) / "kernel.so"
-        command = [str(compiler()), *flags, "kernel.c", "-o", built.name, "-lm"]
-        subprocess.run(command, cwd=scratch, check=True, capture_output=True)
+def _report(name: str, error: Exception) -> None:
+    """Say why kernels are interpreted: once for each kind of error, since most concern every kernel alike."""
+    level = logging.DEBUG if type(error) in _reported else logging.WARNING
+    _reported.add(type(error))
+    words = " ".join(str(error).split())
+    if isinstance(error, subprocess.CalledProcessError):
+        words = f"{error.cmd[0]} failed: {next(iter(error.stderr.splitlines()), words)}"
+    log.log(level, "kernels are interpreted, which is several times slower; '%s': %s", name, words)
+
+
+def _key(functions: dict[str, Function], c_compiler: str, flags: tuple[str, ...]) -> str:
+    """Name of a library: a hash of all that decides what is in it and whether it can run here."""
+    sources = [function.serialize() for function in functions.values()]
+    return hashlib.sha256("|".join([*sources, *flags, _toolchain(c_compiler)]).encode()).hexdigest()[:24]
+
+
+@cache
+def _toolchain(c_compiler: str) -> str:
+    """The compiler, the CasADi that writes the C, the machine and its C library, each with its version."""
+    version = subprocess.run([c_compiler, "--version"], capture_output=True, text=True, errors="replace").stdout
+    machine = (sys.platform, platform.machine(), str(sys.maxsize), *platform.libc_ver())
+    return "|".join((c_compiler, version, ca.CasadiMeta.version(), ca.CasadiMeta.git_revision(), *machine))
+
+
+def _record(library: Path, name: str) -> bytes:
+    """A library's content and its name in a line, as ``sha256sum`` writes it."""
+    return f"{hashlib.sha256(library.read_bytes()).hexdigest()}  {name}\n".encode()
+
+
+def _intact(library: Path) -> bool:
+    """Whether a library is what its record says."""
+    try:
+        return library.with_suffix(".sha256").read_bytes() == _record(library, library.name)
+    except OSError:
+        return False
+
+
+def _build_unless_intact(name: str, functions: dict[str, Function], library: Path, command: tuple[str, ...]) -> None:
+    """Build a library, unless another process did while this one waited for the lock."""
+    if _intact(library):
+        return
+    if library.exists():
+        log.warning("kernel '%s' is compiled again: its library in the cache is damaged: %s", name, library)
+    for left in library.parent.glob(f"{library.stem}-*"):
+        # Of a process that was killed while it built.
+        shutil.rmtree(left, ignore_errors=True)
+    _build(functions, library, command)
+
+
+def _build(functions: dict[str, Function], library: Path, command: tuple[str, ...]) -> None:
+    """Write C, compile it, and put the record and the library in place.
+
+    Raises:
+        OSError: the folder cannot be written, or the compiler not be started.
+        subprocess.CalledProcessError: the compiler failed.
+    """
+    generator = ca.CodeGenerator("kernel.c")
+    for function in functions.values():
+        generator.add(function)
+    with tempfile.TemporaryDirectory(dir=library.parent, prefix=f"{library.stem}-") as scratch:
+        source, built, record = (Path(scratch) / f"kernel.{suffix}" for suffix in ("c", "so", "sha256"))
+        # CasADi's own writing does not notice a full disk.
+        source.write_text(generator.dump())
+        arguments = [*command, source.name, "-o", built.name, "-lm"]
+        subprocess.run(arguments, cwd=scratch, check=True, capture_output=True, text=True, errors="replace")
+        record.write_bytes(_record(built, library.name))
+        # Each step is atomic, and between the two the library does not match its record.
+        record.replace(library.with_suffix(".sha256"))
         built.replace(library)
 
 
 @contextlib.contextmanager
 def _locked(path: Path) -> Iterator[None]:
-    """Hold a lock that other processes wait for."""
-    with path.open("w") as handle:
-        fcntl.flock(handle, fcntl.LOCK_EX)
-        yield
-    path.unlink(missing_ok=True)
+    """Hold a lock that other processes wait for; the file is gone afterwards."""
+    while True:
+        with path.open("w") as handle:
+            fcntl.flock(handle, fcntl.LOCK_EX)
+            # Whoever held it has removed the file: a lock on what has no name keeps nobody out.
+            if not _is_open_file(path, handle.fileno()):
+                continue
+            try:
+                yield
+            finally:
+                path.unlink(missing_ok=True)
+            return
+
+
+def _is_open_file(path: Path, descriptor: int) -> bool:
+    """Whether a path still names the file that a descriptor has open."""
+    try:
+        return os.path.samestat(path.stat(), os.fstat(descriptor))
+    except FileNotFoundError:
+        return False

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import hashlib
+import inspect
 import logging
 import os
+import platform
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import casadi as ca
@@ -15,10 +19,11 @@ import numpy as np
 import pytest
 from casadi import SX, Function
 
-from casadi_hands.nlp import Kernel
+from casadi_hands.nlp import Kernel, machine_code
 from casadi_hands.nlp.assembly import kernel_functions
 from casadi_hands.nlp.machine_code import cache_folder, compiled, compiler
 from casadi_hands.stages import exact_kernels
+from casadi_hands.stages.kernels import dynamics
 
 Array = np.ndarray
 ROOT = Path(__file__).parents[2]
@@ -28,12 +33,22 @@ needs_compiler = pytest.mark.skipif(
 
 
 class Compiler:
-    """A compiler that counts how often it is called and takes its time."""
+    """A compiler that counts what it compiles and takes its time."""
 
     def __init__(self, folder: Path) -> None:
         self.path, self.calls = folder / "counting-cc", folder / "calls"
+        self.call_itself("one", 0.3)
+
+    def call_itself(self, version: str, seconds: float) -> None:
         real = next(path for name in ("cc", "gcc", "clang") if (path := shutil.which(name)))
-        self.path.write_text(f'#!/bin/sh\necho "$@" >> {self.calls}\nsleep 0.3\nexec {real} "$@"\n')
+        lines = [
+            "#!/bin/sh",
+            f'[ "$1" = --version ] && echo "{version}" && exit',
+            f'echo "$@" >> {self.calls}',
+            f"sleep {seconds}",
+            f'exec {real} "$@"',
+        ]
+        self.path.write_text("\n".join(lines) + "\n")
         self.path.chmod(0o755)
 
     @property
@@ -43,11 +58,17 @@ class Compiler:
 
 @pytest.fixture(autouse=True)
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """An empty cache of this test's own."""
+    """An empty cache of this test's own, and a process that has seen and said nothing yet."""
     monkeypatch.setenv("CASADI_HANDS_CACHE", str(tmp_path / "cache"))
-    compiler.cache_clear()
+    monkeypatch.setattr(machine_code, "_reported", set())
+    forget()
     yield tmp_path / "cache"
+    forget()
+
+
+def forget() -> None:
     compiler.cache_clear()
+    machine_code._toolchain.cache_clear()
 
 
 @pytest.fixture
@@ -73,9 +94,13 @@ def is_compiled(functions: dict[str, Function]) -> bool:
     return not any(function.is_a("SXFunction") for function in functions.values())
 
 
+def suffixes(cache: Path) -> list[str]:
+    return sorted(path.suffix for path in cache.iterdir())
+
+
 def kernels() -> list[Kernel]:
     return [
-        exact_kernels.physics(),
+        dynamics(2),
         exact_kernels.contact(2, 0, True),
         exact_kernels.rolling(1, 1),
         exact_kernels.fingers_apart(1, 2, "a"),
@@ -122,7 +147,7 @@ def test_a_kernel_is_compiled_once(counting: Compiler) -> None:
 @needs_compiler
 def test_nothing_but_libraries_stays_in_the_cache(cache: Path) -> None:
     compiled("wave", wave())
-    assert [path.suffix for path in cache.iterdir()] == [".so"]
+    assert suffixes(cache) == [".sha256", ".so"]
 
 
 def test_without_a_compiler_kernels_are_interpreted(
@@ -147,34 +172,268 @@ def test_a_compiler_that_fails_leaves_the_interpreter(
     functions = wave()
     with caplog.at_level(logging.WARNING):
         assert compiled("wave", functions) == functions
+        assert compiled("again", functions) == functions
     (record,) = caplog.records
-    assert record.getMessage().startswith("kernel 'wave' is interpreted, it could not be compiled: ")
-    assert not list(cache.glob("*.so"))
+    message = record.getMessage()
+    assert message.startswith(
+        f"kernels are interpreted, which is several times slower; 'wave': {shutil.which('false')}"
+    )
+    assert "\n" not in message
+    assert not list(cache.iterdir())
 
 
 @needs_compiler
-def test_a_broken_library_does_no_harm(cache: Path, caplog: pytest.LogCaptureFixture) -> None:
-    compiled("wave", wave())
-    (library,) = cache.glob("*.so")
-    # In its place, not in the file that this process has loaded.
-    library.unlink()
-    library.write_bytes(b"not a library")
-    x = np.array([0.3, -0.2, 0.9])
-    with caplog.at_level(logging.WARNING):
-        functions = compiled("wave", wave())
-    np.testing.assert_allclose(numbers(functions, x), np.sin(x) * np.linalg.norm(x), rtol=1e-15)
-    assert is_compiled(functions) or "kernel 'wave' is interpreted" in caplog.text
-
-
-def test_a_cache_that_cannot_be_written_leaves_the_interpreter(
+def test_the_compilers_own_words_are_passed_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
+    broken = tmp_path / "broken-cc"
+    broken.write_text("#!/bin/sh\necho 'kernel.c:1: fatal error: math.h: none' >&2\necho stopped >&2\nexit 1\n")
+    broken.chmod(0o755)
+    monkeypatch.setenv("CC", str(broken))
+    compiled("wave", wave())
+    assert caplog.messages[0].endswith(f"'wave': {broken} failed: kernel.c:1: fatal error: math.h: none")
+
+
+# Prints of two kernels whether each is compiled, then its numbers.
+PROGRAM = f"""
+import casadi as ca
+from casadi import SX, Function
+from casadi_hands.nlp.machine_code import compiled
+{inspect.getsource(wave)}
+for shift in (0.0, 1.0):
+    function = compiled("wave", wave(shift))["first"]
+    print(not function.is_a("SXFunction"), *function([0.3, -0.2, 0.9]).nonzeros())
+"""
+ENVIRONMENT = {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
+
+
+def answers(words: str) -> list[bool]:
+    """Of a program's words, whether each kernel was compiled; the numbers have to be right."""
+    x = np.array([0.3, -0.2, 0.9])
+    lines = [line.split() for line in words.splitlines()]
+    for shift, (_, *found) in enumerate(lines):
+        np.testing.assert_allclose([float(word) for word in found], np.sin(x) * np.linalg.norm(x) + shift, rtol=1e-14)
+    return [line[0] == "True" for line in lines]
+
+
+def start(program: str = PROGRAM, before: tuple[str, ...] = ()) -> subprocess.Popen[str]:
+    """Run a program in a process of its own, so that a signal ends that one."""
+    return subprocess.Popen(
+        [*before, sys.executable, "-c", program],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, **ENVIRONMENT},
+        cwd=ROOT,
+    )
+
+
+def swap(library: Path) -> None:
+    """Another kernel's library and record under this one's name."""
+    compiled("other", wave(2.0))
+    (other,) = (path for path in library.parent.glob("*.so") if path != library)
+    other.replace(library)
+    other.with_suffix(".sha256").replace(library.with_suffix(".sha256"))
+
+
+def flip(library: Path) -> None:
+    """One bit of the code, so that the library still loads."""
+    content = bytearray(library.read_bytes())
+    content[len(content) // 3] ^= 1
+    library.write_bytes(content)
+
+
+DAMAGES: dict[str, Callable[[Path], object]] = {
+    "truncated": lambda library: os.truncate(library, library.stat().st_size // 2),
+    "empty": lambda library: os.truncate(library, 0),
+    "longer": lambda library: library.open("ab").write(b"\0"),
+    "garbage": lambda library: library.write_bytes(b"not a library"),
+    "bit": flip,
+    "another's": swap,
+    "no record": lambda library: library.with_suffix(".sha256").unlink(),
+    "truncated record": lambda library: os.truncate(library.with_suffix(".sha256"), 20),
+    "garbage record": lambda library: library.with_suffix(".sha256").write_bytes(b"\xff\x00"),
+}
+
+
+@needs_compiler
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_library_is_compiled_again(damage: str, cache: Path) -> None:
+    compiled("wave", wave())
+    (library,) = cache.glob("*.so")
+    # A copy in its place: this process has the file itself loaded.
+    shutil.copy(library, cache / "copy")
+    (cache / "copy").replace(library)
+    DAMAGES[damage](library)
+    process = start()
+    words, log = process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert answers(words) == [True, True]
+    assert log == f"kernel 'wave' is compiled again: its library in the cache is damaged: {library}\n"
+    digest = hashlib.sha256(library.read_bytes()).hexdigest()
+    assert library.with_suffix(".sha256").read_text() == f"{digest}  {library.name}\n"
+
+
+@needs_compiler
+def test_a_record_without_its_library_is_no_damage(cache: Path, caplog: pytest.LogCaptureFixture) -> None:
+    # What a process leaves that ends between its two steps.
+    cache.mkdir()
+    compiled("wave", wave())
+    next(cache.glob("*.so")).unlink()
+    assert is_compiled(compiled("wave", wave()))
+    assert suffixes(cache) == [".sha256", ".so"]
+    assert not caplog.records
+
+
+@needs_compiler
+def test_a_process_killed_while_it_builds_leaves_nothing_that_hurts(counting: Compiler, cache: Path) -> None:
+    counting.call_itself("one", 30)
+    killed = start()
+    deadline = time.monotonic() + 30
+    while not counting.count and time.monotonic() < deadline:
+        time.sleep(0.02)
+    killed.kill()
+    killed.communicate(timeout=10)
+    (folder,) = (path for path in cache.iterdir() if path.is_dir())
+    assert (folder / "kernel.c").exists()
+    assert not list(cache.glob("*.so"))
+    counting.call_itself("one", 0)
+    assert is_compiled(compiled("wave", wave()))
+    assert suffixes(cache) == [".sha256", ".so"]
+
+
+def test_the_lock_keeps_all_others_out(tmp_path: Path) -> None:
+    # Each holder removes the file, while others wait for the lock of the one that it removed.
+    counter = tmp_path / "counter"
+    counter.write_text("0")
+    program = f"""
+from pathlib import Path
+from casadi_hands.nlp.machine_code import _locked
+counter = Path({str(counter)!r})
+for _ in range(300):
+    with _locked(counter.with_suffix(".lock")):
+        counter.write_text(str(int(counter.read_text()) + 1))
+"""
+    running = [start(program) for _ in range(4)]
+    assert [process.communicate(timeout=60)[1] for process in running] == [""] * 4
+    assert counter.read_text() == "1200"
+    assert not counter.with_suffix(".lock").exists()
+
+
+def test_the_lock_is_let_go_when_the_build_fails(tmp_path: Path) -> None:
+    lock = tmp_path / "lock"
+    for _ in range(2):
+        with pytest.raises(OSError, match="full"), machine_code._locked(lock):
+            raise OSError("full")
+    assert not lock.exists()
+
+
+@pytest.mark.parametrize("place", ["file/cache", "/proc/cache", "/proc/self/cache"])
+@needs_compiler
+def test_a_cache_that_cannot_be_made_leaves_the_interpreter(
+    place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     (tmp_path / "file").write_text("in the way")
-    monkeypatch.setenv("CASADI_HANDS_CACHE", str(tmp_path / "file" / "cache"))
-    functions = wave()
-    with caplog.at_level(logging.WARNING):
+    monkeypatch.setenv("CASADI_HANDS_CACHE", str(tmp_path / place))
+    for shift in (0.0, 1.0):
+        functions = wave(shift)
         assert compiled("wave", functions) == functions
-    assert "no C compiler" in caplog.text or "kernel 'wave' is interpreted" in caplog.text
+    (message,) = caplog.messages
+    assert message.startswith("kernels are interpreted, which is several times slower; 'wave': [Errno ")
+    assert place in message
+
+
+@needs_compiler
+def test_without_a_home_kernels_are_interpreted(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    for name in ("CASADI_HANDS_CACHE", "XDG_CACHE_HOME", "HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("os.getuid", lambda: 2**31 - 7)
+    functions = wave()
+    assert compiled("wave", functions) == functions
+    assert caplog.messages == [
+        "kernels are interpreted, which is several times slower; 'wave': Could not determine home directory."
+    ]
+
+
+def mounted(options: str, then: str) -> tuple[str, ...]:
+    """A command to put before a program: the cache is a file system of its own, seen by that program alone."""
+    before = ("unshare", "--map-root-user", "--mount", "sh", "-c")
+    mount = f'mkdir -p "$CASADI_HANDS_CACHE" && mount -t tmpfs -o {options} none "$CASADI_HANDS_CACHE"'
+    if not shutil.which("unshare") or subprocess.run([*before, mount], capture_output=True).returncode:
+        pytest.skip("no file systems may be mounted here")
+    return (*before, f'{mount} && {then} && exec "$@"', "sh")
+
+
+@needs_compiler
+@pytest.mark.parametrize("room", ["4k", "12k"], ids=["for no C", "for the C alone"])
+def test_a_full_cache_leaves_the_interpreter(room: str) -> None:
+    full = start(before=mounted(f"size={room}", "true"))
+    words, log = full.communicate(timeout=60)
+    assert full.returncode == 0
+    assert answers(words) == [False, False]
+    assert log.count("\n") == 1
+    assert "No space left on device" in log
+
+
+@needs_compiler
+def test_a_limit_on_the_size_of_files_leaves_the_interpreter(cache: Path) -> None:
+    limited = start("import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (2048, 2048))" + PROGRAM)
+    words, log = limited.communicate(timeout=60)
+    assert limited.returncode == 0
+    assert answers(words) == [False, False]
+    assert log.startswith("kernels are interpreted")
+    assert log.count("\n") == 1
+    assert not list(cache.iterdir())
+
+
+@needs_compiler
+def test_a_read_only_cache_serves_what_it_has(cache: Path, tmp_path: Path) -> None:
+    compiled("wave", wave())
+    cache.rename(tmp_path / "full")
+    fill = f'cp {tmp_path}/full/* "$CASADI_HANDS_CACHE" && mount -o remount,ro "$CASADI_HANDS_CACHE"'
+    process = start(before=mounted("size=1m", fill))
+    words, log = process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert answers(words) == [True, False]
+    assert log.startswith("kernels are interpreted, which is several times slower; 'wave': [Errno 30] Read-only")
+    assert log.count("\n") == 1
+
+
+@needs_compiler
+def test_a_cache_named_by_a_relative_path_serves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("CASADI_HANDS_CACHE", ".")
+    assert is_compiled(compiled("wave", wave()))
+
+
+@needs_compiler
+def test_another_compiler_casadi_or_machine_has_its_own_libraries(
+    counting: Compiler, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    counting.call_itself("one", 0)
+    compiled("wave", wave())
+    counting.call_itself("two", 0)
+    forget()
+    compiled("wave", wave())
+    assert counting.count == 2
+    changes = [
+        (ca.CasadiMeta, "version", lambda: "0.0"),
+        (ca.CasadiMeta, "git_revision", lambda: "0"),
+        (platform, "machine", lambda: "abacus"),
+        (platform, "libc_ver", lambda: ("glibc", "2.0")),
+        (sys, "maxsize", 2**31 - 1),
+    ]
+    for count, (owner, name, value) in enumerate(changes, start=3):
+        with monkeypatch.context() as patch:
+            patch.setattr(owner, name, value)
+            forget()
+            compiled("wave", wave())
+        assert counting.count == count, name
+    forget()
+    compiled("wave", wave())
+    assert counting.count == 2 + len(changes)
 
 
 def test_where_the_cache_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -185,24 +444,14 @@ def test_where_the_cache_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     assert cache_folder() == tmp_path / "home" / ".cache" / "casadi-hands"
-    assert cache_folder().is_dir()
+    assert not cache_folder().exists()
 
 
 @needs_compiler
 def test_processes_that_want_the_same_kernel_at_once_compile_it_once(counting: Compiler, cache: Path) -> None:
-    code = (
-        "from tests.nlp.test_machine_code import compiled, is_compiled, wave\n"
-        "functions = compiled('wave', wave())\n"
-        "print(is_compiled(functions), functions['first']([0.3, -0.2, 0.9]))\n"
-    )
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    running = [
-        subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, env=environment, cwd=ROOT)
-        for _ in range(2)
-    ]
+    running = [start() for _ in range(3)]
     words = [process.communicate(timeout=120)[0] for process in running]
-    assert [process.returncode for process in running] == [0, 0]
-    assert words[0] == words[1]
-    assert words[0].startswith("True ")
-    assert counting.count == 1
-    assert [path.suffix for path in cache.iterdir()] == [".so"]
+    assert [process.returncode for process in running] == [0, 0, 0]
+    assert [answers(each) for each in words] == [[True, True]] * 3
+    assert counting.count == 2
+    assert suffixes(cache) == [".sha256", ".sha256", ".so", ".so"]
