@@ -9,17 +9,15 @@ written to ``table.md`` beside them after every row.
 from __future__ import annotations
 
 import argparse
-import json
 import os
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from shared import joints_of, kept_solve, write_table
+from shared import NOTHING, joints_of, kept_solve, replays_of, write_table
 
-from casadi_hands import Design, audit, replay
+from casadi_hands import Design, audit
 from casadi_hands.errors import DesignError
-from casadi_hands.verify import Figure, replay_many
+from casadi_hands.verify import Figure
 
 HEAD = (
     "task",
@@ -41,7 +39,6 @@ HEAD = (
     "not certified because",
 )
 STAGES = ("floating", "synthesis", "whole_hand", "refine")
-NOTHING = "–"
 
 
 def main() -> None:
@@ -70,27 +67,6 @@ def figures_of(folder: Path) -> dict[str, Figure]:
         return audit(folder).figures
     except DesignError:
         return {}
-
-
-def replays_of(folder: Path, count: int, jobs: int) -> dict[str, Any]:
-    """The nominal replay and at least ``count`` perturbed ones, read from ``replays.json`` if they are there.
-
-    Returns:
-        ``{"nominal": replay, "perturbed": [replay, …]}`` with a replay's fields; empty where there is no scene to play.
-    """
-    file = folder / "replays.json"
-    if file.is_file():
-        known: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-        if len(known["perturbed"]) >= count:
-            return known
-    if not (folder / "scene.xml").is_file():
-        return {}
-    played = {
-        "nominal": asdict(replay(folder)),
-        "perturbed": [asdict(each) for each in replay_many(folder, count, jobs=jobs)],
-    }
-    file.write_text(json.dumps(played, indent=1), encoding="utf-8")
-    return played
 
 
 def row(design: Design, figures: dict[str, Figure], replays: dict[str, Any], seed: int) -> list[str]:
@@ -126,7 +102,7 @@ def row(design: Design, figures: dict[str, Figure], replays: dict[str, Any], see
         errors("final"),
         drops,
         " / ".join(f"{design.seconds.get(stage, 0.0):.0f}" for stage in STAGES),
-        f"{design.seconds['total']:.0f}",
+        f"{design.seconds.get('total', 0.0):.0f}",
         # The first reason is the one that the others follow from.
         design.reason.split(";")[0],
     ]

@@ -1,0 +1,171 @@
+"""Pictures of a design at several moments of its motion."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from raycast import Camera, Capsule, Disc, draw, look, overlay, png
+
+from casadi_hands import Design
+from casadi_hands.design import Hand
+from casadi_hands.export.markup import OBJECT_COLOR, PALM_COLOR, finger_color, joint_color
+from casadi_hands.export.urdf import hand_urdf
+from casadi_hands.view.robot import Robot
+from casadi_hands.view.scene import EXTERNAL_COLOR, FORCE_COLOR, GOAL_COLOR
+from casadi_hands.view.timeline import Timeline, design_timeline, goal_poses
+
+MOMENTS = 5
+"""Pictures of a motion, evenly in time, start and end among them."""
+SIZE = (528, 396)
+"""Width and height, pixels."""
+_JOINT = 1.12  # radius of a joint's ball over its link's: so that joints can be counted
+_ARROW = 1.3  # length of the longest force arrow over the object's half extent
+
+
+def kept_stills(design: Design, folder: Path) -> list[tuple[float, bytes]]:
+    """The pictures of a design, read from its folder if they are not older than its result.
+
+    Args:
+        design: whole or partial.
+        folder: its folder; pictures are kept there as ``still0.png`` and so on.
+
+    Returns:
+        Time (s) and PNG of every moment.
+    """
+    times = moments(design)
+    files = [folder / f"still{k}.png" for k in range(len(times))]
+    made = (folder / "result.json").stat().st_mtime
+    if not all(file.is_file() and file.stat().st_mtime >= made for file in files):
+        for file, picture in zip(files, stills(design, times), strict=True):
+            file.write_bytes(picture)
+    return [(time, file.read_bytes()) for time, file in zip(times, files, strict=True)]
+
+
+def moments(design: Design) -> list[float]:
+    """Times that are drawn, s; the start alone where there is no motion."""
+    if design.motion is None:
+        return [0.0]
+    times: list[float] = np.linspace(design.motion.time[0], design.motion.time[-1], MOMENTS).tolist()
+    return times
+
+
+def stills(design: Design, times: list[float]) -> list[bytes]:
+    """Draw a design at some times, all seen by one camera.
+
+    Args:
+        design: whole or partial; without a hand there is the bare palm, without a motion the start.
+        times: s; the nearest sample is drawn.
+
+    Returns:
+        A PNG with a clear background for each time.
+    """
+    hand = Robot(hand_urdf(design.hand or _bare_palm(design)))
+    timeline = design_timeline(design, hand)
+    samples = [int(np.abs(timeline.time - time).argmin()) for time in times]
+    scenes = [_bodies(design, timeline, k) for k in samples]
+    camera = look(_eye(design.task.palm.rotation[:, 2]), np.vstack([_extent(bodies) for bodies in scenes]), SIZE)
+    ground = design.task.ground
+    pictures = []
+    for bodies, k in zip(scenes, samples, strict=True):
+        picture, distance = draw(camera, bodies, None if ground is None else ground.height)
+        _draw_goals(picture, distance, camera, design, timeline)
+        overlay(picture, distance, camera, _arrows(design, timeline, k), 0.85, True)
+        pictures.append(png(picture))
+    return pictures
+
+
+def _bare_palm(design: Design) -> Hand:
+    palm = design.task.palm
+    return Hand(palm.radius, palm.thickness, (), 0.0, 0.0, 0.0, 0.0, design.task.hand.density)
+
+
+def _bodies(design: Design, timeline: Timeline, sample: int) -> list[Capsule | Disc]:
+    """The palm, the fingers and the object at one sample, in the world."""
+    palm, hand = timeline.palm[sample], design.hand or _bare_palm(design)
+    bodies: list[Capsule | Disc] = [Disc(palm, hand.palm_radius, hand.palm_thickness, PALM_COLOR)]
+    for i, finger in enumerate(hand.fingers):
+        for j, link in enumerate(finger.links):
+            pose = palm @ timeline.links[f"finger{i}_link{j}"][sample]
+            tip = pose[:3, 3] + link.length * pose[:3, 2]
+            is_tip = j == len(finger.links) - 1
+            bodies.append(Capsule(pose[:3, 3], tip, link.radius, finger_color(i), joint_color(i) if is_tip else None))
+            bodies.append(Capsule(pose[:3, 3], pose[:3, 3], _JOINT * link.radius, joint_color(i), shades=False))
+    bodies.extend(_object_at(design, timeline.object[sample], OBJECT_COLOR, checked=True))
+    return bodies
+
+
+def _object_at(design: Design, pose: np.ndarray, color: tuple[float, float, float], checked: bool) -> list[Capsule]:
+    """The object's primitives at a pose (4, 4)."""
+    checks = pose if checked else None
+    ends = ([pose[:3, :3] @ end + pose[:3, 3] for end in shape.segment] for shape in design.task.object.shapes)
+    radii = (shape.radius for shape in design.task.object.shapes)
+    return [Capsule(*pair, radius, color, checks=checks) for pair, radius in zip(ends, radii, strict=True)]
+
+
+def _extent(bodies: list[Capsule | Disc]) -> np.ndarray:
+    """Points (P, 3) whose pictures bound those of the bodies."""
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / np.sqrt(2)
+    points = []
+    for body in bodies:
+        if isinstance(body, Capsule):
+            points.extend([body.start + body.radius * corners, body.end + body.radius * corners])
+        else:
+            angles = np.linspace(0, 2 * np.pi, 16)
+            rim = body.radius * np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+            points.extend([(rim - [0, 0, z]) @ body.pose[:3, :3].T + body.pose[:3, 3] for z in (0.0, body.thickness)])
+    return np.vstack(points)
+
+
+def _draw_goals(picture: np.ndarray, distance: np.ndarray, camera: Camera, design: Design, timeline: Timeline) -> None:
+    """Draw each goal pose as a ghost of the object; for a drawing task the goals' points and the tool's path."""
+    task = design.task
+    if task.tool is None:
+        for pose in goal_poses(task):
+            overlay(picture, distance, camera, _object_at(design, pose, GOAL_COLOR, checked=False), 0.13, False)
+        return
+    dot = 0.04 * task.object.half_extent
+    points = [np.array(goal.tool_at) for goal in task.motion]
+    path = timeline.object[:, :3, :3] @ np.array(task.tool) + timeline.object[:, :3, 3]
+    marks = [Capsule(point, point, 1.8 * dot, GOAL_COLOR) for point in points]
+    marks += [Capsule(a, b, 0.6 * dot, GOAL_COLOR) for a, b in pairwise(path)]
+    overlay(picture, distance, camera, marks, 0.9, False)
+
+
+def _arrows(design: Design, timeline: Timeline, sample: int) -> list[Capsule]:
+    """Contact and external forces as arrows that end where the force acts."""
+    motion = design.motion
+    if motion is None:
+        return []
+    size = design.task.object.half_extent
+    pose = timeline.object[sample]
+    forces = [(motion.contact_point_object[sample, c], motion.contact_force[sample, c], FORCE_COLOR)
+              for c in range(len(motion.contact_names))]  # fmt: skip
+    forces.append((np.zeros(3), motion.external_force[sample], EXTERNAL_COLOR))
+    largest = max(float(np.linalg.norm(motion.contact_force, axis=2).max()), float(np.abs(motion.external_force).max()))
+    pieces = []
+    for point, force, color in forces:
+        strength = float(np.linalg.norm(force))
+        if strength <= 1e-3 * largest:
+            continue
+        tip = pose[:3, :3] @ point + pose[:3, 3]
+        along, width = force / strength, 0.022 * size
+        length = _ARROW * size * strength / largest
+        head = min(0.26 * size, 0.6 * length)
+        pieces.append(Capsule(tip - length * along, tip - head * along, width, color))
+        # A cone is a row of balls that shrink towards the tip.
+        for share in np.linspace(0.02, 1.0, 24):
+            ball = tip - share * head * along
+            pieces.append(Capsule(ball, ball, 3.2 * width * share, color))
+    return pieces
+
+
+def _eye(facing: np.ndarray) -> np.ndarray:
+    """Direction (3,) to the camera: from the palm's side, a little from above and from where the fingers point."""
+    level = np.array([facing[0], facing[1], 0.0])
+    if np.linalg.norm(level) < 0.3:
+        level = np.array([1.0, 0.0, 0.0])
+    level /= np.linalg.norm(level)
+    eye = np.cross(level, [0.0, 0.0, 1.0]) + 0.45 * level + [0.0, 0.0, 0.4]
+    return np.asarray(eye / np.linalg.norm(eye))
