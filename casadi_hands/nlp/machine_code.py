@@ -81,9 +81,10 @@ def _report(name: str, error: Exception) -> None:
     """Say why kernels are interpreted: once for each kind of error, since most concern every kernel alike."""
     level = logging.DEBUG if type(error) in _reported else logging.WARNING
     _reported.add(type(error))
-    words = " ".join(str(error).split())
+    words = str(error)
     if isinstance(error, subprocess.CalledProcessError):
-        words = f"{error.cmd[0]} failed: {next(iter(error.stderr.splitlines()), words)}"
+        words = f"{error.cmd[0]} failed: {error.stderr[:300]}"
+    words = " ".join(words.split())
     log.log(level, "kernels are interpreted, which is several times slower; '%s': %s", name, words)
 
 

@@ -24,31 +24,29 @@ def film(directory: str | Path, file: str | Path, perturbation: Perturbation | N
     """Replay a result folder once and write what it looks like to a video or GIF file.
 
     Raises:
-        HandsError: MuJoCo cannot draw here, or imageio is not installed; the message says which.
+        HandsError: MuJoCo cannot draw here, it or imageio is not installed, or the file cannot be written; the
+            message says which.
         DesignError: as `replay`.
     """
-    try:
-        imageio = import_module("imageio")
-    except ImportError:
-        raise HandsError("a video needs imageio: pip install imageio imageio-ffmpeg; replay works without") from None
-    camera = _Camera(read_folder(directory))
+    imageio, mujoco = _imageio(), _mujoco()
+    camera = _Camera(mujoco, read_folder(directory))
     try:
         outcome = replay(directory, perturbation, camera)
     finally:
         camera.close()
     try:
         imageio.mimsave(file, camera.frames, fps=FRAMES)
-    except (OSError, ValueError) as error:
-        raise HandsError(f"{file}: cannot be written as a video: {error}") from None
+    # imageio passes on what its plugins raise: a LookupError for a still picture's format, say.
+    except (OSError, ValueError, LookupError) as error:
+        raise HandsError(f"{file}: cannot be written as a video: {_one_line(error)}") from None
     return outcome
 
 
 class _Camera:
     """Draws the scene thirty times a second, from the side and far enough to see palm and object."""
 
-    def __init__(self, folder: Folder) -> None:
-        import mujoco
-
+    def __init__(self, mujoco: Any, folder: Folder) -> None:
+        self._mujoco = mujoco
         motion = folder.motion
         points = np.vstack([motion.object_position, motion.base_position])
         self.frames: list[np.ndarray] = []
@@ -63,7 +61,7 @@ class _Camera:
         if data.time * FRAMES < len(self.frames):
             return
         if self._renderer is None:
-            self._renderer = _renderer(model)
+            self._renderer = _renderer(self._mujoco, model)
         self._renderer.update_scene(data, self._view)
         self.frames.append(self._renderer.render())
 
@@ -73,12 +71,38 @@ class _Camera:
             self._renderer.close()
 
 
-def _renderer(model: Any) -> Any:
-    import mujoco
+def _imageio() -> Any:
+    try:
+        return import_module("imageio")
+    except ImportError:
+        raise HandsError("a video needs imageio: pip install 'casadi-hands[video]'; replay works without") from None
 
+
+def _mujoco() -> Any:
+    try:
+        return import_module("mujoco")
+    except ModuleNotFoundError as error:
+        if error.name != "mujoco":
+            raise _cannot_draw(error) from None
+        raise HandsError("a video needs MuJoCo: pip install 'casadi-hands[video]'") from None
+    # MuJoCo loads the OpenGL that MUJOCO_GL names as it is imported.
+    except Exception as error:
+        raise _cannot_draw(error) from None
+
+
+def _renderer(mujoco: Any, model: Any) -> Any:
     try:
         return mujoco.Renderer(model, *SIZE)
     # What a missing OpenGL raises depends on the platform and on MuJoCo's backend.
     except Exception as error:
-        message = f"MuJoCo cannot draw here ({error}); try MUJOCO_GL=egl or MUJOCO_GL=osmesa; replay works without"
-        raise HandsError(message) from None
+        raise _cannot_draw(error) from None
+
+
+def _cannot_draw(error: Exception) -> HandsError:
+    return HandsError(
+        f"MuJoCo cannot draw here ({_one_line(error)}); try MUJOCO_GL=egl or MUJOCO_GL=osmesa; replay works without"
+    )
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())

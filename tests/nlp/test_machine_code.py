@@ -191,7 +191,7 @@ def test_the_compilers_own_words_are_passed_on(
     broken.chmod(0o755)
     monkeypatch.setenv("CC", str(broken))
     compiled("wave", wave())
-    assert caplog.messages[0].endswith(f"'wave': {broken} failed: kernel.c:1: fatal error: math.h: none")
+    assert caplog.messages[0].endswith(f"'wave': {broken} failed: kernel.c:1: fatal error: math.h: none stopped")
 
 
 # Prints of two kernels whether each is compiled, then its numbers.
