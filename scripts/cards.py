@@ -12,9 +12,12 @@ from pathlib import Path
 
 from entries import REPLAYS, STATES, Entry
 from shared import NOTHING
-from stills import kept_stills
+from stills import kept_stills, stills
+
+from casadi_hands import Design
 
 TEMPLATE = Path(__file__).with_name("gallery.html")
+_previews: dict[Path, bytes] = {}  # what tasks without a design look like, by file
 
 
 def page(cards: list[list[Entry]], place: Path) -> str:
@@ -27,10 +30,10 @@ def page(cards: list[list[Entry]], place: Path) -> str:
     best = [entries[0] for entries in cards]
     count = Counter(entry.state for entry in best)
     solved = len(best) - count["not solved"]
-    of = f"{solved} tasks" if solved == len(best) else f"the {solved} tasks solved so far, {len(best)} in all,"
+    so_far = "" if solved == len(best) else f" of {solved} solved so far,"
     summary = (
-        f"Robot hands designed from task files: topology, morphology, motion and forces. Of {of} "
-        f"{count['certified']} are certified: recomputed from the result's files, every physical limit holds."
+        f"Robot hands designed from task files: topology, morphology, motion and forces. {len(best)} tasks;{so_far} "
+        f"{count['certified']} certified: recomputed from the result's files, every physical limit holds."
     )
     parts = {
         "title": "Hands by casadi-hands",
@@ -51,7 +54,7 @@ def card(entries: list[Entry], place: Path) -> str:
     about = f'<p class="about">{escape(entry.about)}</p>' if entry.about else ""
     joints = f"<span>{entry.structure} joints</span>" if entry.structure != NOTHING else ""
     state = entry.state.replace(" ", "-")
-    return f"""<article data-status="{state}">
+    return f"""<article class="card-{state}" data-status="{state}">
 {_stage(entry)}
 <div class="text">
 <div class="head"><h2>{escape(entry.name)}</h2><span class="figure">{figure}</span></div>
@@ -66,19 +69,24 @@ def card(entries: list[Entry], place: Path) -> str:
 
 def _stage(entry: Entry) -> str:
     """The pictures, and a button for each moment where there are several."""
+    if entry.task is None:
+        return '<div class="stage"><span class="nothing">not a task</span></div>'
     name = escape(entry.name, quote=True)
     if entry.design is None or entry.folder is None or not (entry.folder / "result.json").is_file():
-        return '<div class="stage"><span class="nothing">no design yet</span></div>'
-    stills = kept_stills(entry.design, entry.folder)
+        if entry.file not in _previews:
+            _previews[entry.file] = stills(Design(entry.task, "failed"), [0.0])[0]
+        moments = [(0.0, _previews[entry.file])]
+    else:
+        moments = kept_stills(entry.design, entry.folder)
     pictures = "".join(
         f'<img alt="{name} at {time:.3g} s" src="data:image/png;base64,{b64encode(data).decode("ascii")}"'
-        f"{' class=shown' if k == len(stills) // 2 else ''}>"
-        for k, (time, data) in enumerate(stills)
+        f"{' class=shown' if k == len(moments) // 2 else ''}>"
+        for k, (time, data) in enumerate(moments)
     )
-    buttons = "".join(f'<button data-time="{t:.3g} s" aria-label="{t:.3g} s"></button>' for t, _ in stills)
+    buttons = "".join(f'<button data-time="{t:.3g} s" aria-label="{t:.3g} s"></button>' for t, _ in moments)
     return (
         f'<div class="stage">{pictures}<span class="time"></span></div>'
-        f'<div class="strip">{buttons if len(stills) > 1 else ""}</div>'
+        f'<div class="strip">{buttons if len(moments) > 1 else ""}</div>'
     )
 
 

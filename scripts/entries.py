@@ -12,6 +12,7 @@ from shared import NOTHING, is_of, joints_of, replays_of, result_folder, with_se
 
 from casadi_hands import Design, load_task
 from casadi_hands.errors import DesignError, HandsError, TaskError
+from casadi_hands.task import Task
 
 STATES = ("certified", "feasible", "failed", "stopped", "crashed", "not solved")
 """How a task may stand: the statuses of a design, and why there is none."""
@@ -43,6 +44,7 @@ class Entry:
         figures: of the thesis, as its file's first line names them.
         state: one of ``STATES``.
         reason: why it is not certified; else empty.
+        task: None where the file is not a task.
         folder: where the result is.
         design: None where there is none to read.
         replays: as `replays_of` has them.
@@ -55,6 +57,7 @@ class Entry:
     figures: tuple[str, ...]
     state: str
     reason: str = ""
+    task: Task | None = None
     folder: Path | None = None
     design: Design | None = None
     replays: dict[str, Any] = field(default_factory=dict)
@@ -100,7 +103,7 @@ class Entry:
     def goal_error(self) -> str:
         """Distance and, where there is one, angle from the goals."""
         distance, angle = self.figure("goal_position", 1e3), self.figure("goal_angle")
-        return " · ".join(f"{v} {u}" for v, u in ((distance, "mm"), (angle, "deg")) if v != NOTHING) or NOTHING
+        return " · ".join(f"{v}{u}" for v, u in ((distance, " mm"), (angle, "°")) if v != NOTHING) or NOTHING
 
     @property
     def replay_error(self) -> str:
@@ -110,7 +113,7 @@ class Entry:
         nominal = self.replays["nominal"]
         if nominal["dropped"]:
             return "dropped"
-        return f"{1e3 * nominal['position_mean']:.2g} mm · {nominal['angle_mean']:.2g} deg"
+        return f"{1e3 * nominal['position_mean']:.2g} mm · {nominal['angle_mean']:.2g}°"
 
     @property
     def drops(self) -> str:
@@ -134,11 +137,11 @@ def entry_of(file: Path, seed: int, root: Path, jobs: int) -> Entry:
     folders = (result_folder(file, seed, "refine", root), root / file.stem)
     folder = next((each for each in folders if is_of(task, each)), None)
     if folder is None:
-        return Entry(file, seed, *about, "not solved")
+        return Entry(file, seed, *about, "not solved", "", task)
     design = read_apart(folder, task)
     state = state_of(design, folder)
     replays = _replays(folder, jobs) if design.status != "failed" else {}
-    return Entry(file, seed, *about, state, design.reason, folder, design, replays)
+    return Entry(file, seed, *about, state, design.reason, task, folder, design, replays)
 
 
 def state_of(design: Design, folder: Path) -> str:

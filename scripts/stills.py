@@ -65,13 +65,15 @@ def stills(design: Design, times: list[float]) -> list[bytes]:
     timeline = design_timeline(design, hand)
     samples = [int(np.abs(timeline.time - time).argmin()) for time in times]
     scenes = [_bodies(design, timeline, k) for k in samples]
-    camera = look(_eye(design.task.palm.rotation[:, 2]), np.vstack([_extent(bodies) for bodies in scenes]), SIZE)
+    arrows = [_arrows(design, timeline, k) for k in samples]
+    seen = np.vstack([_extent([*scene, *row]) for scene, row in zip(scenes, arrows, strict=True)])
+    camera = look(_eye(design.task.palm.rotation[:, 2]), seen, SIZE)
     ground = design.task.ground
     pictures = []
-    for bodies, k in zip(scenes, samples, strict=True):
+    for bodies, pieces in zip(scenes, arrows, strict=True):
         picture, distance = draw(camera, bodies, None if ground is None else ground.height)
         _draw_goals(picture, distance, camera, design, timeline)
-        overlay(picture, distance, camera, _arrows(design, timeline, k), 0.85, True)
+        overlay(picture, distance, camera, pieces, 0.85, True)
         pictures.append(png(picture))
     return pictures
 
