@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from casadi_hands.errors import SolveError
+from casadi_hands.reasons import Reason
 from casadi_hands.search.score import THRESHOLD, finger_scores, worst_miss
+from casadi_hands.search.shortcoming import shortcoming
 from casadi_hands.search.work import combine_fingers, design_finger, run_all
 from casadi_hands.stages.synthesis import FingerSeed, Synthesised
 from casadi_hands.stages.target import Target
 
-_REACHED = 0.03  # half extents: a tip this near its contact reaches it
 Progress = Callable[[str], None]
 
 
@@ -46,12 +47,12 @@ class Found:
     Attributes:
         candidates: hands of the last round, best objective first.
         farthest: how far the worst of those fingers is from its contact, half extents.
-        short: why fingers stayed above the threshold at the most joints allowed, one sentence each.
+        short: why fingers stayed above the threshold at the most joints allowed, one reason each.
     """
 
     candidates: tuple[Candidate, ...]
     farthest: float
-    short: tuple[str, ...]
+    short: tuple[Reason, ...]
 
 
 class Search:
@@ -103,21 +104,10 @@ class Search:
             if not growing:
                 lacking = [c for c in self.contacts if scores[c] >= self.threshold]
                 farthest = max((worst_miss(self.target, best.hand, c)[0] for c in lacking), default=0.0)
-                return Found(tuple(candidates), farthest, tuple(self._shortcoming(best, c) for c in lacking))
+                short = tuple(shortcoming(self.target, best.hand, c, scores[c]) for c in lacking)
+                return Found(tuple(candidates), farthest, short)
             for c in growing:
                 joints[c] += 1
-
-    def _shortcoming(self, best: Candidate, contact: int) -> str:
-        """What a finger cannot do, in the user's terms."""
-        miss, time = worst_miss(self.target, best.hand, contact)
-        joints = best.joints[self.contacts.index(contact)]
-        finger, length = f"finger '{self.names[contact]}'", self.target.model.units.length
-        if miss > _REACHED:
-            away = 1e3 * miss * length
-            return (
-                f"{finger} cannot reach its contact at {time:.3g} s with {joints} joint(s): it misses by {away:.1f} mm"
-            )
-        return f"{finger} cannot supply the force of its contact with {joints} joint(s)"
 
     def _grow(self, joints: Mapping[int, int], growing: list[int]) -> None:
         """Fresh trials of the fingers that got a joint."""

@@ -1,0 +1,141 @@
+"""The loop of certification: hands are refined, replayed and given more joints until one is certified."""
+
+from __future__ import annotations
+
+import importlib.util
+import tempfile
+
+from casadi_hands.design import Design
+from casadi_hands.pipeline.judge import Judge
+from casadi_hands.pipeline.record import Record
+from casadi_hands.pipeline.steps import adopt, run_search, run_whole_hand
+from casadi_hands.pipeline.words import failing_fingers, refined_reason
+from casadi_hands.reasons import Reason
+from casadi_hands.search.algorithm import Candidate, Found, Search, run_record
+from casadi_hands.stages.floating import Floating
+from casadi_hands.stages.model import Model
+from casadi_hands.stages.refine import WEIGHTS, Margin, Refined, RefineStage
+from casadi_hands.stages.whole_hand import WholeHand
+from casadi_hands.verify import replay, replay_many
+
+AMPLE = Margin()
+SMALL = Margin(friction=0.8, normal_force=0.25)
+FIRM = Margin(normal_force=2.0)
+REPLAYS = 12  # perturbed ones, that a certified design is tried on
+DROPS = 1  # of them, that pass
+OUT_OF_REACH = 0.3  # half extents that a finger misses its contact by: nothing is left to refine
+HANDS_REFINED = 2  # hands of one structure that are tried before fingers get another joint
+
+
+class Certifier:
+    """Refines the hands of a search until one is certified, and keeps the best where none is.
+
+    Args:
+        record: of the solve.
+        model: the task.
+        floating: the motion that hands follow.
+        search: run on, where fingers need more joints.
+        judge: of the designs.
+        jobs: processes for the replays.
+    """
+
+    def __init__(
+        self, record: Record, model: Model, floating: Floating, search: Search, judge: Judge, jobs: int
+    ) -> None:
+        self.record, self.model, self.floating, self.search = record, model, floating, search
+        self.judge, self.jobs = judge, jobs
+
+    def run(self, found: Found) -> Design:
+        """Refine the best hand, the next best, then hands with one more joint where those failed."""
+        best: tuple[int, Design] | None = None
+        if found.farthest > OUT_OF_REACH:
+            run_whole_hand(self.record, self.model, self.floating, found.candidates[0])
+            return self.judge.judge(self.record.design, found.short)
+        while True:
+            failing: set[str] = set()
+            for candidate in found.candidates[:HANDS_REFINED]:
+                judged, refined = self._certify(candidate, found.short)
+                if judged.status == "certified":
+                    return judged
+                self.record.say("refine", f"not certified: {judged.reason}")
+                missed = sum(not figure["holds"] for figure in judged.certificate.values())
+                if best is None or missed < best[0]:
+                    best = (missed, judged)
+                failing |= failing_fingers(self.model, refined)
+                if refined.slips_hopelessly:
+                    break  # a structure that must slip will do so in any of its hands
+            least = self._more_joints(found, failing)
+            if least is None and best is not None:
+                return best[1]
+            self.record.say("synthesis", f"another joint for {', '.join(sorted(failing)) or 'the fingers with fewest'}")
+            found = run_search(self.record, self.model, self.search, least)
+
+    def _certify(self, candidate: Candidate, short: tuple[Reason, ...]) -> tuple[Design, Refined]:
+        """Refine one hand with an ample margin, with a small one where that fails, with more where a replay drops."""
+        whole = run_whole_hand(self.record, self.model, self.floating, candidate)
+        planned = self.record.design
+        with self.record.stage("refine", "the same motion with exact physics, rolling contacts and clearance"):
+            stage = RefineStage(self.model, whole.contacts, candidate.joints, whole.active)
+            refined = self._attempt(stage, whole, AMPLE)
+        if not refined.exact and not refined.slips_hopelessly:
+            with self.record.stage("refine", "again, closer to the limits of friction and grip"):
+                second = self._attempt(stage, whole, SMALL)
+            refined = second if second.exact or second.worst[1] < refined.worst[1] else refined
+        judged = self._judged(refined, short, planned)
+        drops = self._drops(judged)
+        if drops > DROPS:
+            text = f"again with a firmer grip: {drops} of {REPLAYS} replays dropped the object"
+            with self.record.stage("refine", text):
+                firmer = self._attempt(stage, whole, FIRM)
+            again = self._judged(firmer, short, planned)
+            if again.status == "certified" and self._drops(again) < drops:
+                return again, firmer
+        return judged, refined
+
+    def _attempt(self, stage: RefineStage, whole: WholeHand, margin: Margin) -> Refined:
+        """Refine with one margin, and record its solves whether they serve or not."""
+        result = stage.solve(whole, margin)
+        what = f"hand, {margin.friction:g} of the friction and {margin.normal_force:g} weights of grip"
+        runs = [run_record("refine", what, self.record.task.search.seed, step, s) for step, s in result.runs]
+        length = self.model.units.length
+        # What the refinement changed in each finger: base and lengths in m, axes in rad.
+        runs[-1]["design_change"] = {
+            finger: {"base": change["base"] * length, "lengths": change["lengths"] * length, "axes": change["axes"]}
+            for finger, change in result.moved.items()
+        }
+        self.record.add_runs(runs)
+        return result
+
+    def _judged(self, refined: Refined, short: tuple[Reason, ...], planned: Design) -> Design:
+        """Adopt a refined hand and have it judged.
+
+        Args:
+            refined: the hand.
+            short: what its fingers could not do before.
+            planned: the design before it was refined.
+        """
+        self.record.set_costs("refine", refined.runs[-1][1], WEIGHTS)
+        adopt(self.record, self.model, refined.hand)
+        causes = [*short, *refined_reason(self.model, refined)]
+        return self.judge.judge(self.record.design, causes, None if refined.exact else planned)
+
+    def _drops(self, design: Design) -> int:
+        """How many perturbed replays of a certified design drop the object; 0 where there is no simulator to ask."""
+        if design.status != "certified" or importlib.util.find_spec("mujoco") is None:
+            return 0
+        with self.record.stage("refine", "replays of the certified motion"), tempfile.TemporaryDirectory() as scratch:
+            design.save(scratch)
+            if replay(scratch).dropped:
+                return REPLAYS
+            return sum(r.dropped for r in replay_many(scratch, REPLAYS, jobs=self.jobs))
+
+    def _more_joints(self, found: Found, failing: set[str]) -> dict[int, int] | None:
+        """Joints of each finger for the next round; None when no failing finger may have more."""
+        best = found.candidates[0]
+        joints = dict(zip(best.hand.contacts, best.joints, strict=True))
+        chosen = [c for c in joints if self.model.contact_names[c] in failing] or list(joints)
+        chosen = [c for c in chosen if joints[c] < self.search.max_joints]
+        if not chosen:
+            return None
+        fewest = min(joints[c] for c in chosen)
+        return {c: n + (c in chosen and n == fewest) for c, n in joints.items()}

@@ -1,0 +1,89 @@
+"""What a solve has computed so far, kept as it comes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from casadi_hands.design import Design
+from casadi_hands.nlp import Solution
+from casadi_hands.task import Task
+
+STAGES = ("floating", "synthesis", "whole_hand", "refine")
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What a solve is doing.
+
+    Attributes:
+        stage: one of ``STAGES``.
+        text: what is tried, and the best so far.
+        elapsed: s since the solve began.
+    """
+
+    stage: str
+    text: str
+    elapsed: float
+
+
+class Record:
+    """The design as it grows, with every solver run and all time spent, whichever design is returned in the end.
+
+    Args:
+        task: as solved.
+        out: folder that is written on ``keep``, or None.
+        report: told what is being done.
+    """
+
+    def __init__(self, task: Task, out: Path | None, report: Callable[[Progress], None]) -> None:
+        self.task, self.out, self.report = task, out, report
+        self.started = time.perf_counter()
+        self.design = Design(task=task, status="failed", reason="nothing has been computed yet")
+
+    def say(self, stage: str, text: str) -> None:
+        """Report progress."""
+        self.report(Progress(stage, text, time.perf_counter() - self.started))
+
+    @contextmanager
+    def stage(self, name: str, text: str) -> Iterator[None]:
+        """Announce a stage and add its time to the design's."""
+        self.say(name, text)
+        began = time.perf_counter()
+        yield
+        seconds = dict(self.design.seconds)
+        seconds[name] = seconds.get(name, 0.0) + time.perf_counter() - began
+        self.update(seconds=seconds)
+
+    def update(self, **changes: Any) -> None:
+        """Change fields of the design."""
+        self.design = replace(self.design, **changes)
+
+    def add_runs(self, runs: Sequence[dict[str, Any]]) -> None:
+        """Add entries of ``stages`` of result.json."""
+        self.update(stages=[*self.design.stages, *runs])
+
+    def set_costs(self, stage: str, solution: Solution, weights: Mapping[str, Any]) -> None:
+        """Keep the weights and weighted values of a stage's terms; of annealed weights the last."""
+        costs = {}
+        for name, value in solution.terms.items():
+            weight = weights.get(name.removesuffix("_perturbed"), 0.0)
+            weight = weight[-1] if isinstance(weight, tuple | list) else weight
+            costs[name] = {"weight": float(weight), "value": value}
+        self.update(costs={**self.design.costs, stage: costs})
+
+    def complete(self, design: Design) -> Design:
+        """An earlier design with all runs and all time spent until now."""
+        seconds = {**self.design.seconds, "total": time.perf_counter() - self.started}
+        return replace(design, stages=self.design.stages, seconds=seconds)
+
+    def keep(self, design: Design) -> Design:
+        """Complete a design and write it, if there is a place for it."""
+        design = self.complete(design)
+        if self.out is not None:
+            design.save(self.out)
+        return design

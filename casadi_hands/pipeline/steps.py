@@ -1,0 +1,76 @@
+"""The soft stages, one function each: solve, and put what came out into the record."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from concurrent.futures import Executor
+from dataclasses import replace
+
+from casadi_hands.pipeline.record import Record
+from casadi_hands.search.algorithm import Candidate, Found, Search, run_record
+from casadi_hands.stages.floating import Floating, FloatingStage
+from casadi_hands.stages.model import Model
+from casadi_hands.stages.outcome import floating_motion, hand_of, joint_loads, whole_hand_motion
+from casadi_hands.stages.target import target_of
+from casadi_hands.stages.whole_hand import WholeHand, WholeHandStage
+
+
+def run_floating(record: Record, model: Model) -> Floating:
+    """Stage 1."""
+    task = record.task
+    with record.stage("floating", f"object's motion with {model.contacts} floating contacts"):
+        result = FloatingStage(model).solve(dict(task.weights.floating))
+    record.add_runs([run_record("floating", what, task.search.seed, what, s) for what, s in result.runs])
+    record.set_costs("floating", result.solution, dict(task.weights.floating))
+    record.update(motion=floating_motion(model, result))
+    record.keep(replace(record.design, reason="stopped before a hand was designed"))
+    return result
+
+
+def prepare_search(record: Record, model: Model, floating: Floating, executor: Executor | None) -> Search:
+    """Algorithm 1 with the task's settings, for a floating motion."""
+    settings = record.task.search
+    return Search(
+        target_of(model, floating),
+        dict(record.task.weights.synthesis),
+        trials=settings.trials,
+        recombinations=settings.recombinations,
+        max_joints=settings.max_joints,
+        threshold=settings.threshold,
+        seed=settings.seed,
+        executor=executor,
+        progress=lambda text: record.say("synthesis", text),
+    )
+
+
+def run_search(record: Record, model: Model, search: Search, least: Mapping[int, int] | None = None) -> Found:
+    """Stage 2, from ``least`` joints a finger on; its best hand goes into the record."""
+    with record.stage("synthesis", f"fingers for {len(search.contacts)} contacts"):
+        found = search.run(least)
+    best = found.candidates[0]
+    record.add_runs(search.take_runs())
+    record.set_costs("synthesis", best.hand.solution, dict(record.task.weights.synthesis))
+    record.update(hand=hand_of(record.task, model, best.hand.fingers, best.hand.contacts, 1.0, 1.0), motion=None)
+    joints = "+".join(map(str, best.joints))
+    record.say("synthesis", f"best hand has {joints} joints, scores {', '.join(f'{s:.3f}' for s in best.scores)}")
+    return found
+
+
+def run_whole_hand(record: Record, model: Model, floating: Floating, candidate: Candidate) -> WholeHand:
+    """Stage 3."""
+    task, joints = record.task, "+".join(map(str, candidate.joints))
+    with record.stage("whole_hand", f"object and hand of {joints} joints together"):
+        stage = WholeHandStage(model, candidate.hand.contacts, candidate.joints, task.palm.may_move)
+        result = stage.solve(floating, candidate.hand.fingers, dict(task.weights.whole_hand))
+    record.add_runs([run_record("whole_hand", "hand", task.search.seed, "", result.solution)])
+    record.set_costs("whole_hand", result.solution, dict(task.weights.whole_hand))
+    adopt(record, model, result)
+    record.keep(replace(record.design, reason="stopped before the motion was refined"))
+    return result
+
+
+def adopt(record: Record, model: Model, result: WholeHand) -> None:
+    """Make a hand and its motion the record's."""
+    torque, speed = joint_loads(model, result)
+    hand = hand_of(record.task, model, result.fingers, result.contacts, torque, speed)
+    record.update(hand=hand, motion=whole_hand_motion(model, result))
