@@ -1,25 +1,35 @@
-"""What stages, statics and the audit find wanting, as reasons."""
+"""What statics, motors and the audit find wanting, as reasons."""
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from casadi_hands.design import Design, Hand
 from casadi_hands.pipeline.holding import HELD, MOST_GRIP, grips, least_friction, least_torque
-from casadi_hands.reasons import Reason, joints_of
+from casadi_hands.reasons import Reason
 from casadi_hands.search.shortcoming import moment
 from casadi_hands.stages.floating import Floating
-from casadi_hands.stages.model import Model, Units
-from casadi_hands.stages.refine import Refined
+from casadi_hands.stages.model import Model
 from casadi_hands.verify import Audit
 from casadi_hands.verify.report import Figure, show
 
-_BALANCE = frozenset(("residual", "residual_between"))
-_GRIP = _BALANCE | {"friction_excess", "pull", "gap_between", "slip", "unsupplied_force", "disturbance_radius"}
+_GRIP = frozenset(  # figures that follow where the hand cannot grip, and a refinement in vain ends anywhere
+    (
+        "residual",
+        "residual_between",
+        "friction_excess",
+        "pull",
+        "gap_between",
+        "slip",
+        "unsupplied_force",
+        "disturbance_radius",
+        "torque",
+        "gap",
+        "penetration",
+    )
+)
 
 
 def friction_reason(model: Model, floating: Floating) -> Reason | None:
@@ -47,7 +57,7 @@ def friction_reason(model: Model, floating: Floating) -> Reason | None:
     least = least_friction(model, floating)
     contacts = "contacts that surround the object better or oppose each other"
     advice = contacts if least is None else f"friction of at least {least:.2g}, or {contacts}"
-    return Reason(what, advice, _GRIP | {"torque"}, root=True)
+    return Reason(what, advice, _GRIP, root=True)
 
 
 def torque_reason(model: Model, design: Design) -> Reason | None:
@@ -64,7 +74,7 @@ def torque_reason(model: Model, design: Design) -> Reason | None:
         f"load, and the motors give {given:.3g} N·m"
     )
     advice = "stronger motors (actuator.torque), a lighter object, more friction or a palm nearer by"
-    return Reason(what, advice, _GRIP | {"torque", "gap"}, root=True)
+    return Reason(what, advice, _GRIP, root=True)
 
 
 def speed_reason(model: Model, design: Design) -> Reason | None:
@@ -83,150 +93,6 @@ def speed_reason(model: Model, design: Design) -> Reason | None:
     return Reason(what, "faster motors (actuator.speed) or slower goals", frozenset(("speed",)))
 
 
-@dataclass(frozen=True)
-class _Limit:
-    """What a violated constraint of the refinement means.
-
-    Attributes:
-        cannot: continues ``finger 'x' cannot ...``.
-        unit: of the violation: ``length``, ``force``, ``torque``, or none that a reader would know.
-        advice: what to try.
-        explains: figures of the audit that follow.
-    """
-
-    cannot: str
-    unit: str
-    advice: str
-    explains: frozenset[str]
-
-
-_REACH = "more joints (search.max_joints) or a contact on the palm's side of the object"
-_ROOM = "thinner links (hand.link_radius), a palm farther away or contacts farther apart"
-_MOVED = _Limit(
-    "be moved as planned by the forces of its contacts", "", "slower goals, more friction or more fingers", _BALANCE
-)
-_LIMITS = {
-    "physics.defect": _MOVED,
-    "wrench.sum": _MOVED,
-    "middle_torque.sum": _MOVED,
-    "contact.on_surfaces": _Limit("reach its contact", "length", _REACH, _BALANCE | {"gap", "gap_between", "slip"}),
-    "contact.opposed": _Limit(
-        "reach its contact with its surface facing the object's", "", _REACH, frozenset(("gap", "gap_between", "slip"))
-    ),
-    "contact.facing": _Limit(
-        "reach its contact from outside the object", "", _REACH, frozenset(("penetration", "gap", "gap_between"))
-    ),
-    "contact.pressing": _Limit(
-        "press firmly enough", "force", "contacts that oppose each other better, or more friction", frozenset(("pull",))
-    ),
-    "contact.cone": _Limit(
-        "press without slipping", "", "more friction or slower goals", frozenset(("friction_excess", "slip"))
-    ),
-    "contact.passive": _Limit(
-        "supply its force with its joints",
-        "force",
-        "more joints (search.max_joints) or a contact that is pressed from another side",
-        frozenset(("unsupplied_force",)),
-    ),
-    "contact.torque": _Limit(
-        "supply its force within the torque limit",
-        "torque",
-        "stronger motors (actuator.torque), a lighter object or more friction",
-        frozenset(("torque", "unsupplied_force")),
-    ),
-    "rolling.no_slip": _Limit(
-        "roll with the object",
-        "length",
-        "more joints (search.max_joints) or a smaller turn of the object",
-        frozenset(("slip", "gap_between", "residual_between")),
-    ),
-    "apart.clear": _Limit("stay clear of the other bodies", "length", _ROOM, frozenset(("penetration",))),
-    "apart_touching.clear": _Limit("stay clear of the other bodies", "length", _ROOM, frozenset(("penetration",))),
-    "fingers_apart.clear": _Limit("stay clear of each other", "length", _ROOM, frozenset(("penetration",))),
-    "joint_motion.speed": _Limit(
-        "keep within the joints' speed limit",
-        "speed",
-        "faster motors (actuator.speed) or slower goals",
-        frozenset(("speed",)),
-    ),
-    "stay.on_palm": _Limit("start on the palm", "", "a larger palm (palm.radius)", frozenset()),
-}
-
-
-def failing_fingers(model: Model, refined: Refined) -> set[str]:
-    """Names of the fingers that kept a motion from being exact; none if it cannot be laid to fingers."""
-    if refined.slips_hopelessly:
-        most = max(refined.slips.values())
-        return {name for name, slip in refined.slips.items() if slip > 0.3 * most}
-    numbers = map(int, re.findall(r"\d+", refined.worst[0].split(".")[0]))
-    return {model.contact_names[number] for number in numbers if number < model.contacts}
-
-
-def refined_reason(model: Model, refined: Refined) -> list[Reason]:
-    """Why a refined motion is not exact; nothing if it is."""
-    if refined.exact:
-        return []
-    joints = {
-        model.contact_names[c]: f.joints for c, f in zip(refined.hand.contacts, refined.hand.fingers, strict=True)
-    }
-    if refined.slips_hopelessly:
-        worst = max(refined.slips, key=lambda name: refined.slips[name])
-        slip = 1e3 * refined.slips[worst] * model.units.length
-        what = f"finger '{worst}' with {joints_of(joints[worst])} cannot roll with the object: it slips {slip:.1f} mm"
-        return [Reason(what, _LIMITS["rolling.no_slip"].advice, _GRIP | {"gap", "penetration"})]
-    (name, violation), who = refined.worst, sorted(failing_fingers(model, refined))
-    kernel, constraint = name.split(".")
-    limit = _LIMITS.get(f"{re.sub(r'[0-9_]+$', '', kernel)}.{constraint}")
-    if limit is None:
-        limit = _Limit(f"meet {name}", "", "more joints (search.max_joints) or slower goals", frozenset())
-    fingers = " and ".join(f"'{finger}'" for finger in who)
-    subject = f"finger{'s' if len(who) > 1 else ''} {fingers}" if who else "the object"
-    when = _when(model, refined, kernel, constraint)
-    what = (
-        f"no exact motion was found with {'+'.join(map(str, joints.values()))} joints: "
-        f"{subject} cannot {limit.cannot}{when}{_by(violation, limit.unit, model.units)}"
-    )
-    return [Reason(what, limit.advice, limit.explains)]
-
-
-def _by(violation: float, unit: str, units: Units) -> str:
-    """By how much a constraint is violated, in SI or weights; nothing if that would say nothing to a reader."""
-    if unit == "length":
-        return f", by {1e3 * violation * units.length:.2g} mm"
-    if unit == "force":
-        return f", by {violation:.2g} weights"
-    if unit == "torque":
-        return f", by {violation * units.torque:.2g} N·m"
-    return f", by {violation:.2g} rad/s" if unit == "speed" else ""
-
-
-def _when(model: Model, refined: Refined, kernel: str, constraint: str) -> str:
-    """When a constraint is violated most; nothing where its rows are not known to be samples."""
-    values = refined.runs[-1][1].constraints.get(f"{kernel}.{constraint}")
-    if values is None:
-        return ""
-    rows = values.reshape(len(values), -1)
-    # Bounded below: the least value is worst. All others are equations or bounded alike on both sides.
-    row = int(
-        rows.min(axis=1).argmin() if constraint in ("pressing", "cone", "clear") else abs(rows).max(axis=1).argmax()
-    )
-    knots = _knots(model, refined, kernel)
-    return f" at {moment(model.schedule, model.schedule.samples[knots[row]])}" if len(knots) == len(values) else ""
-
-
-def _knots(model: Model, refined: Refined, kernel: str) -> NDArray[np.int64]:
-    """The samples that a kernel's instances stand for: all, all but the last, or those where its finger touches."""
-    count = len(model.schedule.samples)
-    number = re.search(r"(\d+)$", kernel)
-    name = re.sub(r"[0-9_]+$", "", kernel)
-    if name in ("contact", "apart_touching", "rolling") and number:
-        active = refined.hand.active[:, int(number[1])]
-        if name == "rolling":
-            return np.flatnonzero(active[:-1])
-        return np.flatnonzero(active | np.append(False, active[:-1]))
-    return np.arange(count - 1 if name in ("physics", "middle_torque") else count)
-
-
 # The audit's figures.
 
 _ADVICE = {
@@ -240,7 +106,7 @@ _ADVICE = {
     "gap": "more joints (search.max_joints) or contacts nearer the palm",
     "gap_between": "a smaller time_step or more joints (search.max_joints)",
     "slip": "more joints (search.max_joints), or limits.slip as wide as you can accept",
-    "penetration": _ROOM,
+    "penetration": "thinner links (hand.link_radius), a palm farther away or contacts farther apart",
     "joint_limit": "wider hand.joint_limits or more joints (search.max_joints)",
     "speed": "faster motors (actuator.speed) or slower goals",
     "torque": "stronger motors (actuator.torque) or a lighter object",

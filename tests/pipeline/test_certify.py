@@ -1,0 +1,93 @@
+"""The loop of certification, on made-up verdicts: which hands are tried, who gets a joint, what is returned."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from casadi_hands.design import Design
+from casadi_hands.pipeline import certify
+from casadi_hands.pipeline.certify import Certifier
+from casadi_hands.pipeline.record import Record
+from casadi_hands.search.algorithm import Candidate, Found
+from casadi_hands.stages.model import build_model
+from tests.search.example import ball_target, ball_task, hand, pointing
+
+Verdict = tuple[int, str, bool]  # limits missed, the constraint that was worst, whether it slips hopelessly
+
+
+def found(*joints: tuple[int, int], farthest: float = 0.0) -> Found:
+    """Hands of a round, best first; told apart by their trial."""
+    target = ball_target()
+    candidates = []
+    for trial, (left, right) in enumerate(joints):
+        fingers = [pointing(target, 0, [[1, 0, 0]] * left), pointing(target, 1, [[1, 0, 0]] * right)]
+        candidates.append(Candidate(hand(fingers, (0, 1)), (0.0, 0.0), trial))
+    return Found(tuple(candidates), farthest, ())
+
+
+class Loop(Certifier):
+    """Verdicts are given; the search returns one hand with the joints it is asked for."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, verdicts: list[Verdict], max_joints: int) -> None:
+        search: Any = SimpleNamespace(max_joints=max_joints)
+        judge: Any = SimpleNamespace(judge=lambda design, causes: replace(design, status="failed", reason="far"))
+        floating: Any = None
+        task = ball_task()
+        super().__init__(Record(task, None, lambda _: None), build_model(task), floating, search, judge, 1)
+        self.verdicts, self.tried = verdicts, []  # type: ignore[var-annotated]
+        self.least: list[dict[int, int]] = []
+        monkeypatch.setattr(certify, "run_search", self._search)
+        monkeypatch.setattr(certify, "run_whole_hand", lambda *_: self.tried.append("whole hand"))
+
+    def _search(self, *arguments: Any) -> Found:
+        self.least.append(arguments[-1])
+        return found((arguments[-1][0], arguments[-1][1]))
+
+    def _certify(self, candidate: Candidate, short: Any) -> tuple[Design, Any]:
+        missed, worst, slips = self.verdicts[len(self.tried)]
+        self.tried.append(candidate.joints)
+        refined = SimpleNamespace(slips_hopelessly=slips, slips={"left": 1.0, "right": 0.1}, worst=(worst, 1.0))
+        self.record.add_runs([{"stage": "refine", "what": len(self.tried)}])
+        certificate = {str(i): {"holds": i >= missed} for i in range(9)}
+        status = "failed" if missed else "certified"
+        words = f"attempt {len(self.tried)}"
+        return replace(self.record.design, status=status, reason=words, certificate=certificate), refined
+
+
+def test_the_first_certified_hand_is_returned(monkeypatch: pytest.MonkeyPatch) -> None:
+    loop = Loop(monkeypatch, [(2, "physics.defect", False), (0, "", False)], max_joints=3)
+    assert loop.run(found((1, 1), (1, 1), (1, 1))).status == "certified"
+    assert loop.tried == [(1, 1), (1, 1)]
+
+
+def test_the_finger_that_failed_gets_a_joint_until_none_may(monkeypatch: pytest.MonkeyPatch) -> None:
+    verdicts = [(3, "contact1.passive", False), (4, "contact1.cone", False), (1, "contact1.cone", False)]
+    loop = Loop(monkeypatch, [*verdicts, (2, "contact1.cone", False)], max_joints=3)
+    design = loop.run(found((1, 1), (1, 1)))
+    assert loop.tried == [(1, 1), (1, 1), (1, 2), (1, 3)]
+    assert loop.least == [{0: 1, 1: 2}, {0: 1, 1: 3}]
+    # The third attempt missed fewest limits; a fourth was made after it, and its run and time are the design's too.
+    assert design.reason == "attempt 3"
+    assert [run["what"] for run in loop.record.complete(design).stages] == [1, 2, 3, 4]
+
+
+def test_where_no_finger_is_to_blame_those_with_fewest_joints_get_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    loop = Loop(monkeypatch, [(1, "physics.defect", False), (0, "", False)], max_joints=3)
+    assert loop.run(found((2, 1))).status == "certified"
+    assert loop.least == [{0: 2, 1: 2}]
+
+
+def test_a_structure_that_must_slip_is_tried_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    loop = Loop(monkeypatch, [(1, "rolling0.no_slip", True), (0, "", False)], max_joints=3)
+    assert loop.run(found((1, 1), (1, 1))).status == "certified"
+    assert loop.least == [{0: 2, 1: 1}]
+
+
+def test_a_hand_far_from_its_contacts_is_not_refined(monkeypatch: pytest.MonkeyPatch) -> None:
+    loop = Loop(monkeypatch, [], max_joints=3)
+    assert loop.run(found((1, 1), farthest=0.31)).reason == "far"
+    assert loop.tried == ["whole hand"]

@@ -1,0 +1,54 @@
+"""What is kept: runs, costs, and all time, whichever design is returned."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+
+from casadi_hands.design import Design
+from casadi_hands.pipeline.record import Progress, Record
+from tests.search.example import ball_task
+from tests.stages.example import made_up_solution
+
+
+def record(news: list[Progress], out: Path | None = None) -> Record:
+    return Record(ball_task(), out, news.append)
+
+
+def test_an_earlier_design_gets_the_runs_and_times_of_what_was_tried_after_it() -> None:
+    news: list[Progress] = []
+    kept = record(news)
+    with kept.stage("refine", "first"):
+        time.sleep(0.02)
+    kept.add_runs([{"stage": "refine", "what": "first"}])
+    earlier = kept.design
+    with kept.stage("refine", "second"):
+        time.sleep(0.03)
+    kept.add_runs([{"stage": "refine", "what": "second"}])
+    design = kept.complete(earlier)
+    assert earlier.seconds["refine"] < 0.045
+    assert 0.05 <= design.seconds["refine"] <= design.seconds["total"]
+    assert [run["what"] for run in design.stages] == ["first", "second"]
+    assert [(word.stage, word.text) for word in news] == [("refine", "first"), ("refine", "second")]
+
+
+def test_costs_have_the_last_of_annealed_weights_and_those_of_perturbed_twins() -> None:
+    kept = record([])
+    solution = made_up_solution({}, physics=2.0, physics_perturbed=3.0, collision=4.0, unknown=5.0)
+    kept.set_costs("synthesis", solution, {"physics": 10.0, "collision": (0.1, 5.0, 100.0)})
+    assert kept.design.costs["synthesis"] == {
+        "physics": {"weight": 10.0, "value": 2.0},
+        "physics_perturbed": {"weight": 10.0, "value": 3.0},
+        "collision": {"weight": 100.0, "value": 4.0},
+        "unknown": {"weight": 0.0, "value": 5.0},
+    }
+
+
+def test_what_is_kept_is_written(tmp_path: Path) -> None:
+    kept = record([], tmp_path)
+    kept.keep(kept.design)
+    loaded = Design.load(tmp_path)
+    assert loaded.reason == "nothing has been computed yet"
+    assert loaded.seconds["total"] == pytest.approx(time.perf_counter() - kept.started, abs=5)
