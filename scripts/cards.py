@@ -129,7 +129,7 @@ def _foot(entries: list[Entry], place: Path) -> str:
         elif len(entries) > 1:
             links.append(f"<span>{seed}</span>")
     time = "" if entries[0].seconds == NOTHING else f"<span>{entries[0].seconds} s</span>"
-    return " ".join([*links, time])
+    return " ".join([*links, time]).strip()
 
 
 def _filter(count: Counter[str], total: int) -> str:

@@ -5,14 +5,11 @@ All vectors are in one world frame and one unit of length.
 
 from __future__ import annotations
 
-import struct
-import zlib
 from dataclasses import dataclass
 
 import numpy as np
+from camera import OVERSAMPLING, Camera
 
-OVERSAMPLING = 2
-"""Rays per pixel and direction."""
 KEY_LIGHT = np.array([-0.35, 0.7, 0.8])
 """Towards the light: right, up and back to the viewer."""
 _OUTLINE = 0.55  # of the colour that is left where one body ends before another
@@ -57,56 +54,6 @@ class Disc:
     color: tuple[float, float, float]
 
 
-@dataclass(frozen=True)
-class Camera:
-    """A camera with perspective.
-
-    Attributes:
-        position: (3,).
-        axes: (3, 3) rows: right, up, back to the viewer.
-        focal: focal length over the picture's width.
-        offset: (2,) what is in the picture's middle, right and up, over the width.
-        size: width and height, pixels.
-    """
-
-    position: np.ndarray
-    axes: np.ndarray
-    focal: float
-    offset: np.ndarray
-    size: tuple[int, int]
-
-    def rays(self) -> np.ndarray:
-        """Unit directions (rows, columns, 3) of all rays."""
-        width, height = (OVERSAMPLING * n for n in self.size)
-        x = ((np.arange(width) + 0.5) / width - 0.5 + self.offset[0]) / self.focal
-        y = ((height / 2 - np.arange(height) - 0.5) / width + self.offset[1]) / self.focal
-        flat = np.stack([*np.meshgrid(x, y), -np.ones((height, width))], axis=-1)
-        rays: np.ndarray = (flat / np.linalg.norm(flat, axis=-1, keepdims=True)) @ self.axes
-        return rays
-
-
-def look(eye: np.ndarray, points: np.ndarray, size: tuple[int, int], margin: float = 0.06) -> Camera:
-    """A camera that looks against ``eye`` and has all points in its picture.
-
-    Args:
-        eye: (3,) unit direction from what is looked at to the camera.
-        points: (P, 3).
-        size: width and height, pixels.
-        margin: free share of the picture at each side.
-    """
-    right = np.cross([0.0, 0.0, 1.0], eye)
-    right /= np.linalg.norm(right)
-    axes = np.array([right, np.cross(eye, right), eye])
-    middle = (points.min(axis=0) + points.max(axis=0)) / 2
-    position = middle + 5.0 * np.linalg.norm(points - middle, axis=1).max() * eye
-    seen = (points - position) @ axes.T
-    flat = seen[:, :2] / -seen[:, 2:]
-    low, high = flat.min(axis=0), flat.max(axis=0)
-    shape = np.array([1.0, size[1] / size[0]])
-    focal = float(((1 - 2 * margin) * shape / (high - low)).min())
-    return Camera(position, axes, focal, (low + high) / 2 * focal, size)
-
-
 def draw(camera: Camera, bodies: list[Capsule | Disc], ground: float | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Draw solid bodies, with light, shadow and outlines, and shadows on the level ground.
 
@@ -118,7 +65,7 @@ def draw(camera: Camera, bodies: list[Capsule | Disc], ground: float | None = No
     Returns:
         Picture (rows, columns, 4), RGBA in 0..1, oversampled, and distance (rows, columns) of what each ray meets.
     """
-    rays = camera.rays()
+    rays = camera.rays
     distance = np.full(rays.shape[:2], _FAR)
     nearest = np.full(rays.shape[:2], -1)
     for k, body in enumerate(bodies):
@@ -159,7 +106,7 @@ def overlay(
         opacity: share of their colour.
         through: whether solid bodies in front do not hide them.
     """
-    rays, met_first = camera.rays(), np.full(distance.shape, _FAR)
+    rays, met_first = camera.rays, np.full(distance.shape, _FAR)
     color = np.zeros((*distance.shape, 3))
     for body in bodies:
         rows, columns = _window(camera, body)
@@ -172,23 +119,6 @@ def overlay(
     alpha = opacity + (1 - opacity) * below
     picture[shown, :3] = (opacity * color[shown] + (1 - opacity) * below * picture[shown, :3]) / alpha
     picture[shown, 3:] = alpha
-
-
-def png(picture: np.ndarray) -> bytes:
-    """An oversampled picture (rows, columns, 4), RGBA in 0..1, as a PNG file of its final size."""
-    n = OVERSAMPLING
-    rows, columns = picture.shape[0] // n, picture.shape[1] // n
-    blocks = np.clip(picture, 0, 1).reshape(rows, n, columns, n, 4)
-    alpha = blocks[..., 3:].mean(axis=(1, 3))
-    color = (blocks[..., :3] * blocks[..., 3:]).mean(axis=(1, 3)) / np.maximum(alpha, 1e-9)
-    pixels = np.round(255 * np.concatenate([color, alpha], axis=-1)).astype(np.uint8)
-    # PNG's filter 1: each pixel less the one to its left.
-    filtered = np.concatenate([pixels[:, :1], pixels[:, 1:] - pixels[:, :-1]], axis=1).reshape(rows, -1)
-    lines = np.concatenate([np.ones((rows, 1), np.uint8), filtered], axis=1)
-    header = struct.pack(">IIBBBBB", columns, rows, 8, 6, 0, 0, 0)
-    chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(lines.tobytes(), 9)), (b"IEND", b""))
-    packed = (struct.pack(">I", len(d)) + kind + d + struct.pack(">I", zlib.crc32(kind + d)) for kind, d in chunks)
-    return b"\x89PNG\r\n\x1a\n" + b"".join(packed)
 
 
 def _window(camera: Camera, body: Capsule | Disc) -> tuple[slice, slice]:
@@ -284,18 +214,21 @@ def _openness(points: np.ndarray, normal: np.ndarray, light: np.ndarray, others:
     """How much light (P,) reaches points past other bodies: 1 for all, less in shadow and in corners."""
     lit, open_sky = np.ones(len(points)), np.ones(len(points))
     facing = np.maximum(normal @ light, 0.0)
+    in_light = facing > 0
+    lit_points = points[in_light]
     for other in others:
         to_other = _on_axis(points, other)[1] - points
-        distance = np.maximum(np.linalg.norm(to_other, axis=1), other.radius)
-        cosine = np.maximum((normal * to_other).sum(axis=1) / distance, 0.0)
+        distance = np.maximum(np.sqrt(np.einsum("ij,ij->i", to_other, to_other)), other.radius)
+        cosine = np.maximum(np.einsum("ij,ij->i", normal, to_other) / distance, 0.0)
         open_sky *= 1 - 0.6 * cosine * (other.radius / distance) ** 2
         # How near the ray to the light passes the other's axis, from the nearest of a few places along it.
-        for share in (0.0, 0.33, 0.67, 1.0):
-            beyond = other.start + share * (other.end - other.start) - points
+        miss = np.full(len(lit_points), np.inf)
+        for share in (0.0, 0.33, 0.67, 1.0) if (other.start != other.end).any() else (0.0,):
+            beyond = other.start + share * (other.end - other.start) - lit_points
             ahead = beyond @ light
-            miss = np.linalg.norm(beyond - ahead[:, None] * light, axis=1) / other.radius
-            shadow = np.clip((1.5 - miss) / 1.0, 0.0, 1.0) * (ahead > 0.5 * other.radius)
-            lit = np.minimum(lit, 1 - shadow)
+            aside = np.sqrt(np.maximum(np.einsum("ij,ij->i", beyond, beyond) - ahead**2, 0.0))
+            miss = np.minimum(miss, np.where(ahead > 0.5 * other.radius, aside, np.inf))
+        lit[in_light] = np.minimum(lit[in_light], 1 - np.clip(1.5 - miss / other.radius, 0.0, 1.0))
     openness: np.ndarray = open_sky * (1 - 0.4 * facing * (1 - lit))
     return openness
 

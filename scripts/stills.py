@@ -6,7 +6,8 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from raycast import Camera, Capsule, Disc, draw, look, overlay, png
+from camera import Camera, look, png
+from raycast import Capsule, Disc, draw, overlay
 
 from casadi_hands import Design
 from casadi_hands.design import Hand
@@ -21,6 +22,7 @@ MOMENTS = 5
 SIZE = (528, 396)
 """Width and height, pixels."""
 _JOINT = 1.12  # radius of a joint's ball over its link's: so that joints can be counted
+_DOT = 0.07  # radius of a goal point over the object's half extent
 _ARROW = 1.3  # length of the longest force arrow over the object's half extent
 
 
@@ -66,8 +68,8 @@ def stills(design: Design, times: list[float]) -> list[bytes]:
     samples = [int(np.abs(timeline.time - time).argmin()) for time in times]
     scenes = [_bodies(design, timeline, k) for k in samples]
     arrows = [_arrows(design, timeline, k) for k in samples]
-    seen = np.vstack([_extent([*scene, *row]) for scene, row in zip(scenes, arrows, strict=True)])
-    camera = look(_eye(design.task.palm.rotation[:, 2]), seen, SIZE)
+    everything = [*_goals(design), *(body for row in (*scenes, *arrows) for body in row)]
+    camera = look(_eye(design.task.palm.rotation[:, 2]), _extent(everything), SIZE)
     ground = design.task.ground
     pictures = []
     for bodies, pieces in zip(scenes, arrows, strict=True):
@@ -120,19 +122,27 @@ def _extent(bodies: list[Capsule | Disc]) -> np.ndarray:
     return np.vstack(points)
 
 
-def _draw_goals(picture: np.ndarray, distance: np.ndarray, camera: Camera, design: Design, timeline: Timeline) -> None:
-    """Draw each goal pose as a ghost of the object; for a drawing task the goals' points and the tool's path."""
+def _goals(design: Design) -> list[Capsule]:
+    """The object at each goal pose; for a drawing task a dot at each goal point."""
     task = design.task
     if task.tool is None:
-        for pose in goal_poses(task):
-            overlay(picture, distance, camera, _object_at(design, pose, GOAL_COLOR, checked=False), 0.13, False)
-        return
-    dot = 0.04 * task.object.half_extent
+        return [body for pose in goal_poses(task) for body in _object_at(design, pose, GOAL_COLOR, checked=False)]
     points = [np.array(goal.tool_at) for goal in task.motion]
-    path = timeline.object[:, :3, :3] @ np.array(task.tool) + timeline.object[:, :3, 3]
-    marks = [Capsule(point, point, 1.8 * dot, GOAL_COLOR) for point in points]
-    marks += [Capsule(a, b, 0.6 * dot, GOAL_COLOR) for a, b in pairwise(path)]
-    overlay(picture, distance, camera, marks, 0.9, False)
+    return [Capsule(point, point, _DOT * task.object.half_extent, GOAL_COLOR) for point in points]
+
+
+def _draw_goals(picture: np.ndarray, distance: np.ndarray, camera: Camera, design: Design, timeline: Timeline) -> None:
+    """Draw each goal pose as a ghost of the object; for a drawing task the goals' points and the tool's path."""
+    goals, tool = _goals(design), design.task.tool
+    if tool is None:
+        pieces = len(design.task.object.shapes)
+        for k in range(0, len(goals), pieces):
+            overlay(picture, distance, camera, goals[k : k + pieces], 0.13, False)
+        return
+    path = timeline.object[:, :3, :3] @ np.array(tool) + timeline.object[:, :3, 3]
+    width = _DOT / 3 * design.task.object.half_extent
+    line = [Capsule(a, b, width, GOAL_COLOR) for a, b in pairwise(path)]
+    overlay(picture, distance, camera, [*goals, *line], 0.9, False)
 
 
 def _arrows(design: Design, timeline: Timeline, sample: int) -> list[Capsule]:
