@@ -10,7 +10,7 @@ from collections import Counter
 from html import escape
 from pathlib import Path
 
-from entries import REPLAYS, STATES, Entry
+from entries import STATES, Entry
 from shared import NOTHING
 from stills import kept_stills, stills
 
@@ -96,25 +96,25 @@ def _figures(entry: Entry) -> str:
         return ""
 
     def millimetres(name: str) -> str:
-        return _with_unit(entry.figure(name, 1e3), "mm")
+        text = entry.figure(name, 1e3)
+        if text == NOTHING:
+            return text
+        # Finer than a micrometre is not worth a wider column.
+        return "< 0.001 mm" if 0 < float(text) < 1e-3 else f"{text} mm"
 
     cells = [
         ("goal error", entry.goal_error, entry.misses("goal_position", "goal_angle")),
         ("slip", millimetres("slip"), entry.misses("slip")),
         ("penetration", millimetres("penetration"), entry.misses("penetration")),
-        ("residual / weight", entry.figure("residual", 1.0, ".0e"), entry.misses("residual", "residual_between")),
         ("replay", entry.replay_error, entry.replay_error == "dropped"),
-        (f"dropped of {REPLAYS}", entry.drops.partition("/")[0], False),
+        ("residual", entry.figure("residual", 1.0, ".0e"), entry.misses("residual", "residual_between")),
+        ("dropped", entry.drops, False),
     ]
     return f"<dl>{''.join(_cell(*cell) for cell in cells)}</dl>"
 
 
 def _cell(label: str, value: str, missed: bool) -> str:
     return f"<div><dt>{escape(label)}</dt><dd{' class=missed' if missed else ''}>{escape(value)}</dd></div>"
-
-
-def _with_unit(value: str, unit: str) -> str:
-    return value if value == NOTHING else f"{value} {unit}"
 
 
 def _foot(entries: list[Entry], place: Path) -> str:

@@ -132,7 +132,15 @@ def entry_of(file: Path, seed: int, root: Path, jobs: int) -> Entry:
     try:
         task = with_seed(load_task(file), seed)
     except TaskError as error:
-        return Entry(file, seed, file.stem.replace("_", " "), "", figures_of(file), "failed", str(error))
+        return Entry(
+            file,
+            seed,
+            file.stem.replace("_", " "),
+            "",
+            figures_of(file),
+            "failed",
+            str(error).replace(str(file), file.name),
+        )
     about = (task.name, task.about, figures_of(file))
     folders = (result_folder(file, seed, "refine", root), root / file.stem)
     folder = next((each for each in folders if is_of(task, each)), None)
