@@ -23,7 +23,7 @@ from casadi_hands.stages.model import Model
 
 Array = NDArray[np.float64]
 HELD = 0.05  # m·g and m·g·half extent of missing wrench, that the floating stage lets pass too
-MOST_GRIP = 5.0  # m·g; where a contact must press harder, friction is too low
+MOST_GRIP = 2.0  # m·g, the firmest grip that a refinement asks for; where more is needed, friction is too low
 MOST_FRICTION = 4.0  # beyond that of any fingertip
 _SPARE = 1e-6  # by which the second of two linear programmes may miss the optimum of the first
 

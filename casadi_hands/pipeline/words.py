@@ -56,7 +56,11 @@ def friction_reason(model: Model, floating: Floating) -> Reason | None:
         )
     least = least_friction(model, floating)
     contacts = "contacts that surround the object better or oppose each other"
-    advice = contacts if least is None else f"friction of at least {least:.2g}, or {contacts}"
+    advice = (
+        contacts
+        if least is None
+        else f"friction of {least:.2g} or more, with which {MOST_GRIP:g} weights would do, or {contacts}"
+    )
     return Reason(what, advice, _GRIP, root=True)
 
 

@@ -53,11 +53,13 @@ def shortcoming(target: Target, hand: Synthesised, contact: int, score: float) -
     finger = hand.fingers[hand.contacts.index(contact)]
     who, length = f"finger '{target.model.contact_names[contact]}'", target.model.units.length
     beyond = beyond_reach(target, contact, finger.joints)
-    k = int(beyond.argmax())
+    goals = list(target.model.schedule.goals)
+    # A goal is what the user can change; what lies between goals is told where only that is out of reach.
+    k = goals[int(beyond[goals].argmax())] if beyond[goals].max() > 0 else int(beyond.argmax())
     if beyond[k] > 0:
-        longest = 1e3 * target.link_length[1] * length
+        longest, when = 1e3 * target.link_length[1] * length, moment(target.model.schedule, target.times[k])
         what = (
-            f"{who} cannot reach {moment(target.model.schedule, target.times[k])} with {joints_of(finger.joints)}: "
+            f"{who} cannot reach {when if k in goals else f'its contact at {when}'} with {joints_of(finger.joints)}: "
             f"its contact is {1e3 * beyond[k] * length:.1f} mm beyond links of at most {longest:.1f} mm each"
         )
         return Reason(what, "longer links (hand.link_length), a palm nearer by or a nearer goal", _NO_CONTACT, True)

@@ -58,6 +58,21 @@ def test_a_contact_out_of_reach_is_named_with_its_goal_and_the_links() -> None:
     assert "hand.link_length" in reason.advice
 
 
+@pytest.mark.parametrize(
+    ("heights", "when"),
+    [
+        ((3.0, 9.0, 4.0), "goal 2 (0.6 s)"),  # farther between the goals, but a goal is out of reach too
+        ((2.0, 9.0, 2.0), "its contact at 0.3 s (between goals 1 and 2)"),
+        ((4.0, 9.0, 3.0), "goal 1 (0 s)"),
+    ],
+)
+def test_goals_out_of_reach_are_named_before_what_lies_between(heights: tuple[float, ...], when: str) -> None:
+    target = with_links(1.1)
+    target.points[:, 0, 2] = heights
+    made = hand([pointing(target, 0, [[1, 0, 0]] * 2), pointing(target, 1, [[1, 0, 0]])], (0, 1))
+    assert f"cannot reach {when} with 2 joints" in shortcoming(target, made, 0, 60.0).what
+
+
 def test_a_reachable_contact_that_is_missed_is_not_called_out_of_reach() -> None:
     target = ball_target()
     made = hand([pointing(target, 0, [[1, 0, 0]]), pointing(target, 1, [[1, 0, 0]])], (0, 1))
