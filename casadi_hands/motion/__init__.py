@@ -10,7 +10,7 @@ from casadi_hands.motion.rotation import (
     rotation_matrix,
 )
 from casadi_hands.motion.schedule import Schedule
-from casadi_hands.motion.spline import catmull_rom, held, linear
+from casadi_hands.motion.spline import catmull_rom, eased, held, linear
 
 __all__ = [
     "Schedule",
@@ -18,6 +18,7 @@ __all__ = [
     "angular_motion",
     "catmull_rom",
     "conjugate",
+    "eased",
     "exponential",
     "held",
     "linear",

@@ -53,3 +53,13 @@ def catmull_rom(knots: ArrayLike, times: ArrayLike) -> Weights:
     weights[rows, index] += (2 * s**3 - 3 * s**2 + 1)[:, 0]
     weights[rows, index + 1] += (3 * s**2 - 2 * s**3)[:, 0]
     return weights
+
+
+def eased(knots: ArrayLike, times: ArrayLike) -> Weights:
+    """Times (T,) moved within their intervals so that what is linear in them rests at every knot.
+
+    Each interval is passed at 6s⁵ - 15s⁴ + 10s³: speed and acceleration vanish at its ends.
+    """
+    at = np.asarray(knots, float)
+    index, s = _segment(at, np.clip(np.asarray(times, float), at[0], at[-1]))
+    return np.asarray(at[index] + (at[index + 1] - at[index]) * s**3 * (6 * s**2 - 15 * s + 10))

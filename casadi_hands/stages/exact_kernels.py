@@ -1,4 +1,4 @@
-"""The blocks of the refine stage: physics between knots, contact, rolling, clearance, all to be met exactly."""
+"""The fingers' blocks of the refine stage: contact, rolling, supply, clearance, all to be met exactly."""
 
 from __future__ import annotations
 
@@ -7,108 +7,20 @@ from dataclasses import dataclass
 import casadi as ca
 from casadi import SX
 
-from casadi_hands.geometry import norm
-from casadi_hands.motion import conjugate, multiply, rotation_matrix
+from casadi_hands.motion import conjugate, rotation_matrix
 from casadi_hands.nlp import Kernel
 from casadi_hands.stages.finger_symbols import FingerSymbols, PlacedFinger, morphology
 from casadi_hands.stages.hand_kernels import distances
 from casadi_hands.stages.kernels import placed
+from casadi_hands.stages.surface import smooth_surface, tangents
 from casadi_hands.terms import clearance, finger
 
-SUBSTEPS = 4  # of the integration between two knots
 LEVER_DAMPING = 0.04  # half extents/rad: forces that need a shorter lever than about this count as not supplied
-_KINK = 1e-3  # smoothing of a capsule's change from cylinder to cap, relative to its length
 
 
 def free_morphology(kernel: Kernel, joints: int, tag: str = "") -> FingerSymbols:
     """A finger whose morphology is variables: base, lengths, axis coordinates; its seed frames are a parameter."""
     return morphology(kernel.variable, kernel.parameter(f"frames{tag}", 9 * joints), joints, tag)
-
-
-def smooth_surface(point: SX, start: SX, end: SX, radius: SX) -> tuple[SX, SX]:
-    """Signed distance and outward normal (3,) of a capsule whose kink is rounded; all in one frame."""
-    along = end - start
-    t = ca.dot(point - start, along) / (ca.sumsqr(along) + 1e-9)
-    t = (ca.sqrt(t**2 + _KINK**2) - ca.sqrt((t - 1) ** 2 + _KINK**2) + 1) / 2
-    offset = point - start - t * along
-    distance = norm(offset, 1e-6)
-    return distance - radius, offset / distance
-
-
-def tangents(normal: SX, helper: SX) -> tuple[SX, SX]:
-    """Two unit vectors (3,) across a unit normal; ``helper`` (3,) must not be near it."""
-    first = ca.cross(helper, normal)
-    first = first / norm(first, 1e-9)
-    return first, ca.cross(normal, first)
-
-
-def wrench(contacts: int) -> Kernel:
-    """The contacts' force and torque at a knot, as variables of their own: physics then knows no contacts."""
-    kernel = Kernel("wrench")
-    total = kernel.variable("total", 6)
-    points, forces = _contacts(kernel, contacts, "")
-    kernel.constrain("sum", ca.vertcat(ca.sum2(forces), _torque(points, forces)) - total)
-    return kernel
-
-
-def middle_torque(contacts: int) -> Kernel:
-    """The contacts' torque halfway between two knots, with forces and points linear in the object's frame."""
-    kernel = Kernel("middle_torque")
-    middle = kernel.variable("middle", 3)
-    ends = [_contacts(kernel, contacts, str(i)) for i in range(2)]
-    points, forces = ((ends[0][i] + ends[1][i]) / 2 for i in range(2))
-    kernel.constrain("sum", _torque(points, forces) - middle)
-    return kernel
-
-
-def _contacts(kernel: Kernel, contacts: int, tag: str) -> tuple[SX, SX]:
-    """Declare the points and forces (3, C) of all contacts."""
-    points, forces = (kernel.variable(name + tag, 3 * contacts) for name in ("points", "forces"))
-    return ca.reshape(points, 3, contacts), ca.reshape(forces, 3, contacts)
-
-
-def _torque(points: SX, forces: SX) -> SX:
-    return sum((ca.cross(points[:, i], forces[:, i]) for i in range(points.shape[1])), SX.zeros(3, 1))
-
-
-def physics() -> Kernel:
-    """Newton–Euler from one knot to the next by RK4; forces and contact points linear in the object's frame.
-
-    The force is then linear in time and the torque quadratic: both ends and the middle say all of it.
-    """
-    kernel = Kernel("physics")
-    states = [(kernel.variable(f"pose{i}", 6), kernel.variable(f"rate{i}", 6)) for i in range(2)]
-    wrenches = [kernel.variable(f"wrench{i}", 6) for i in range(2)]
-    middle = kernel.variable("middle", 3)
-    reference, step = kernel.parameter("reference", 4), kernel.parameter("step")
-    gravity, inertial = kernel.parameter("gravity", 3), kernel.parameter("inertial")
-    inertia = ca.reshape(kernel.parameter("inertia", 9), 3, 3)
-    inverse = ca.reshape(kernel.parameter("inverse", 9), 3, 3)
-
-    def derivative(state: SX, s: float) -> SX:
-        quaternion, velocity, omega = state[3:7], state[7:10], state[10:13]
-        force = (1 - s) * wrenches[0][:3] + s * wrenches[1][:3]
-        ends = (1 - s) * (1 - 2 * s) * wrenches[0][3:] + s * (2 * s - 1) * wrenches[1][3:]
-        torque = ends + 4 * s * (1 - s) * middle
-        total = ca.mtimes(rotation_matrix(quaternion), force) + gravity
-        alpha = ca.mtimes(inverse, torque / inertial - ca.cross(omega, ca.mtimes(inertia, omega)))
-        spin = multiply(quaternion, ca.vertcat(0, omega)) / 2
-        return ca.vertcat(velocity, spin, total / inertial, alpha)
-
-    position, quaternion = placed(states[0][0], reference)
-    state, h = ca.vertcat(position, quaternion, states[0][1]), step / SUBSTEPS
-    for i in range(SUBSTEPS):
-        s, ds = i / SUBSTEPS, 1 / SUBSTEPS
-        k1 = derivative(state, s)
-        k2 = derivative(state + h / 2 * k1, s + ds / 2)
-        k3 = derivative(state + h / 2 * k2, s + ds / 2)
-        k4 = derivative(state + h * k3, s + ds)
-        state = state + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-    position, quaternion = placed(states[1][0], reference)
-    turned = 2 * multiply(conjugate(state[3:7]), quaternion)[1:]
-    kernel.cost("object_acceleration", (states[1][1] - states[0][1]) / step)
-    kernel.constrain("defect", ca.vertcat(position - state[:3], turned, states[1][1] - state[7:]))
-    return kernel
 
 
 @dataclass(frozen=True)
@@ -169,8 +81,7 @@ def contact(joints: int, index: int, limited: bool) -> Kernel:
     """One touching contact at one knot: on both surfaces, normals opposed, in the cone, supplied by the joints.
 
     Constraints: ``on_surfaces`` (2), ``opposed`` (2), ``facing`` (1: cosine between the outward normals),
-    ``pressing`` (1: normal force), ``cone`` (1: (μ f_n)² - f_t²), ``passive`` (3: force no joint supplies),
-    and where the task limits it ``torque`` (n).
+    and those of ``_hold``. The cost of friction is the fourth power of the share in use.
     """
     kernel = Kernel(f"contact{index}")
     symbols = free_morphology(kernel, joints)
@@ -184,20 +95,42 @@ def contact(joints: int, index: int, limited: bool) -> Kernel:
     kernel.constrain("on_surfaces", ca.vertcat(touch.off_object, touch.off_link))
     kernel.constrain("opposed", ca.vertcat(ca.dot(first, touch.link_normal), ca.dot(second, touch.link_normal)))
     kernel.constrain("facing", ca.dot(touch.normal, touch.link_normal))
+    pressing, across, passive = _hold(kernel, touch, force, friction, limited)
+    kernel.cost("passive_force", passive)
+    kernel.cost("stay_point", point - wanted_point)
+    kernel.cost("stay_force", force - wanted_force)
+    kernel.cost("friction_margin", across / (friction * pressing + 0.1) ** 2)
+    return kernel
+
+
+def held(joints: int, index: int, limited: bool) -> Kernel:
+    """A second force of a touching contact at one knot: in the cone, and supplied by the joints, as the first."""
+    kernel = Kernel(f"held{index}")
+    symbols = free_morphology(kernel, joints)
+    pose, point, angles = kernel.variable("pose", 6), kernel.variable("point", 3), kernel.variable("angles", joints)
+    force = kernel.variable("force", 3)
+    scene, friction = Scene.declare(kernel), kernel.parameter("friction")
+    _, _, passive = _hold(kernel, scene.touch(pose, point, angles, symbols), force, friction, limited)
+    kernel.cost("passive_force", passive)
+    return kernel
+
+
+def _hold(kernel: Kernel, touch: Touch, force: SX, friction: SX, limited: bool) -> tuple[SX, SX, SX]:
+    """Constrain a contact force (3,), object frame; return its normal part, tangential square and passive part.
+
+    Constraints: ``pressing`` (1: normal force), ``cone`` (1: (μ f_n)² - f_t²), ``passive`` (3: force no joint
+    supplies), and where the task limits it ``torque`` (n).
+    """
     pressing = -ca.dot(force, touch.normal)
+    across = ca.sumsqr(force + pressing * touch.normal)
     kernel.constrain("pressing", pressing)
-    across = ca.dot(force, first) ** 2 + ca.dot(force, second) ** 2
     kernel.constrain("cone", (friction * pressing) ** 2 - across)
     in_palm = ca.mtimes(touch.rotation, force)
     passive = finger.null_space_force(touch.placed.jacobian, in_palm, LEVER_DAMPING)
     kernel.constrain("passive", passive)
     if limited:
         kernel.constrain("torque", ca.mtimes(touch.placed.jacobian.T, in_palm))
-    kernel.cost("passive_force", passive)
-    kernel.cost("stay_point", point - wanted_point)
-    kernel.cost("stay_force", force - wanted_force)
-    kernel.cost("friction_margin", across / (friction * pressing + 0.1) ** 2)
-    return kernel
+    return pressing, across, passive
 
 
 def rolling(joints: int, index: int) -> Kernel:
@@ -295,14 +228,6 @@ def joint_motion(joints: int, index: int, limited: bool) -> Kernel:
     return kernel
 
 
-def force_change(contacts: int) -> Kernel:
-    """Change of the contact forces from one knot to the next."""
-    kernel = Kernel("force_change")
-    before, after = kernel.variable("before", 3 * contacts), kernel.variable("after", 3 * contacts)
-    kernel.cost("force_change", after - before)
-    return kernel
-
-
 def stay(joints: int, index: int) -> Kernel:
     """A finger's morphology: short, on the palm, and near what the synthesis found."""
     kernel = Kernel(f"stay{index}")
@@ -314,12 +239,4 @@ def stay(joints: int, index: int) -> Kernel:
     wanted = [kernel.parameter(n, k) for n, k in (("base", 2), ("lengths", joints), ("axes", 2 * joints))]
     kernel.cost("stay_design", ca.vertcat(base - wanted[0], lengths - wanted[1], axes - wanted[2]))
     kernel.constrain("on_palm", ca.sumsqr(base))
-    return kernel
-
-
-def stay_on_path() -> Kernel:
-    """The object near the motion of the whole-hand stage at one knot."""
-    kernel = Kernel("stay_path")
-    pose, wanted = kernel.variable("pose", 6), kernel.parameter("wanted", 6)
-    kernel.cost("stay_path", pose - wanted)
     return kernel

@@ -18,6 +18,7 @@ from casadi_hands.task import Task
 
 Array = NDArray[np.float64]
 STANDARD_GRAVITY = 9.81  # m/s², sets the force unit where a task has none
+_WITHIN = 0.9 / math.sqrt(3)  # share of a limit that each of three coordinates may use
 _DIGITS = 12  # significant digits kept, so that scaled tasks give the very same numbers
 
 
@@ -76,6 +77,7 @@ class Model:
         palm_quaternion: (S, 4) world from palm, [w, x, y, z].
         goal_positions: (G, 3) world; for a drawing the tool's targets.
         goal_vectors: (G, 3) rotation vectors from the reference orientation, world; zeros for a drawing.
+        goal_tolerance: half extents and rad, what each coordinate may miss a goal by within the task's limits.
         reference: (4,) quaternion of the reference orientation.
         tool: (3,) object frame, or None when goals are poses.
         perturbation_force: (S, 3) m·g, world.
@@ -102,6 +104,7 @@ class Model:
     palm_quaternion: Array
     goal_positions: Array
     goal_vectors: Array
+    goal_tolerance: tuple[float, float]
     reference: Array
     tool: Array | None
     perturbation_force: Array
@@ -173,6 +176,10 @@ def build_model(task: Task) -> Model:
         palm_quaternion=palm_quaternion,
         goal_positions=round_off(positions / length),
         goal_vectors=vectors,
+        goal_tolerance=(
+            round_off(_WITHIN * task.limits.goal_position / length),
+            _WITHIN * math.radians(task.limits.goal_angle),
+        ),
         reference=reference,
         tool=None if not task.draws else round_off(np.asarray(task.tool) / length),
         perturbation_force=round_off(forces / units.force),

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from casadi_hands.motion import linear
+from casadi_hands.motion import eased, linear
 from casadi_hands.nlp import Problem, Rows
 from casadi_hands.stages import kernels
 from casadi_hands.stages.model import Model
@@ -161,11 +161,23 @@ def _bind_clearance(problem: Problem, model: Model, side: ObjectSide, palm: Rows
         problem.bind(kernel, rows, parameters)
 
 
+def tool_path(model: Model) -> Array:
+    """Where a drawing's tool must be at the samples, (S, 3) world: on straight lines, at rest at every goal."""
+    return _between_goals(model, model.schedule.samples) @ model.goal_positions
+
+
+def _between_goals(model: Model, times: Array) -> Array:
+    """Weights (T, G) of the goals on the straight way between them; a drawing slows down at its corners."""
+    goals = model.schedule.keyframes[list(model.schedule.goals)]
+    if model.tool is not None:
+        times = eased(goals, times)
+    return linear(goals, times)
+
+
 def straight_path(model: Model) -> Array:
     """Poses (N, 6) at the keyframes on the straight way between goals; a drawing's object stays upright."""
     positions = model.goal_positions if model.tool is None else model.goal_positions - model.tool
-    keyframes = model.schedule.keyframes
-    return linear(keyframes[list(model.schedule.goals)], keyframes) @ np.hstack([positions, model.goal_vectors])
+    return _between_goals(model, model.schedule.keyframes) @ np.hstack([positions, model.goal_vectors])
 
 
 def pose_bounds(model: Model) -> tuple[Array, Array]:
@@ -202,9 +214,7 @@ def object_parameters(model: Model) -> dict[str, Array | float]:
         "straight": straight_path(model),
     }
     if model.tool is not None:
-        values["tool"] = model.tool
-        weights = linear(model.schedule.keyframes[list(model.schedule.goals)], model.schedule.samples)
-        values["targets"] = weights @ model.goal_positions
+        values["tool"], values["targets"] = model.tool, tool_path(model)
     else:
         values["vectors"] = model.goal_vectors
     for suffix in ("", "_perturbed") if model.perturbed else ("",):

@@ -1,0 +1,207 @@
+"""The object's blocks of the refine stage: physics between knots, ground, clearance, drawing, all to be met exactly."""
+
+from __future__ import annotations
+
+import casadi as ca
+from casadi import SX
+
+from casadi_hands.geometry import point_disc_distance
+from casadi_hands.motion import conjugate, multiply, rotation_matrix
+from casadi_hands.nlp import Kernel
+from casadi_hands.stages.kernels import placed
+from casadi_hands.stages.surface import smooth_surface
+
+SUBSTEPS = 4  # of the integration between two knots
+
+
+def wrench(contacts: int) -> Kernel:
+    """The contacts' force and torque at a knot, as variables of their own: physics then knows no contacts."""
+    kernel = Kernel("wrench")
+    total = kernel.variable("total", 6)
+    points, forces = _contacts(kernel, contacts, "")
+    kernel.constrain("sum", ca.vertcat(ca.sum2(forces), _torque(points, forces)) - total)
+    return kernel
+
+
+def middle_torque(contacts: int) -> Kernel:
+    """The contacts' torque halfway between two knots, with forces and points linear in the object's frame."""
+    kernel = Kernel("middle_torque")
+    middle = kernel.variable("middle", 3)
+    ends = [_contacts(kernel, contacts, str(i)) for i in range(2)]
+    points, forces = ((ends[0][i] + ends[1][i]) / 2 for i in range(2))
+    kernel.constrain("sum", _torque(points, forces) - middle)
+    return kernel
+
+
+def _contacts(kernel: Kernel, contacts: int, tag: str) -> tuple[SX, SX]:
+    """Declare the points and forces (3, C) of all contacts."""
+    points, forces = (kernel.variable(name + tag, 3 * contacts) for name in ("points", "forces"))
+    return ca.reshape(points, 3, contacts), ca.reshape(forces, 3, contacts)
+
+
+def _torque(points: SX, forces: SX) -> SX:
+    return sum((ca.cross(points[:, i], forces[:, i]) for i in range(points.shape[1])), SX.zeros(3, 1))
+
+
+def physics() -> Kernel:
+    """Newton–Euler from one knot to the next by RK4; forces and contact points linear in the object's frame.
+
+    The force is then linear in time and the torque quadratic: both ends and the middle say all of it.
+    """
+    kernel = Kernel("physics")
+    states = [(kernel.variable(f"pose{i}", 6), kernel.variable(f"rate{i}", 6)) for i in range(2)]
+    wrenches = [kernel.variable(f"wrench{i}", 6) for i in range(2)]
+    middle = kernel.variable("middle", 3)
+    reference, step = kernel.parameter("reference", 4), kernel.parameter("step")
+    gravity, inertial = kernel.parameter("gravity", 3), kernel.parameter("inertial")
+    inertia = ca.reshape(kernel.parameter("inertia", 9), 3, 3)
+    inverse = ca.reshape(kernel.parameter("inverse", 9), 3, 3)
+
+    def derivative(state: SX, s: float) -> SX:
+        quaternion, velocity, omega = state[3:7], state[7:10], state[10:13]
+        force = (1 - s) * wrenches[0][:3] + s * wrenches[1][:3]
+        ends = (1 - s) * (1 - 2 * s) * wrenches[0][3:] + s * (2 * s - 1) * wrenches[1][3:]
+        torque = ends + 4 * s * (1 - s) * middle
+        total = ca.mtimes(rotation_matrix(quaternion), force) + gravity
+        alpha = ca.mtimes(inverse, torque / inertial - ca.cross(omega, ca.mtimes(inertia, omega)))
+        spin = multiply(quaternion, ca.vertcat(0, omega)) / 2
+        return ca.vertcat(velocity, spin, total / inertial, alpha)
+
+    position, quaternion = placed(states[0][0], reference)
+    state, h = ca.vertcat(position, quaternion, states[0][1]), step / SUBSTEPS
+    for i in range(SUBSTEPS):
+        s, ds = i / SUBSTEPS, 1 / SUBSTEPS
+        k1 = derivative(state, s)
+        k2 = derivative(state + h / 2 * k1, s + ds / 2)
+        k3 = derivative(state + h / 2 * k2, s + ds / 2)
+        k4 = derivative(state + h * k3, s + ds)
+        state = state + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+    position, quaternion = placed(states[1][0], reference)
+    turned = 2 * multiply(conjugate(state[3:7]), quaternion)[1:]
+    kernel.cost("object_acceleration", (states[1][1] - states[0][1]) / step)
+    kernel.constrain("defect", ca.vertcat(position - state[:3], turned, states[1][1] - state[7:]))
+    return kernel
+
+
+def pushed(contacts: int) -> Kernel:
+    """Second forces at a knot that, with an external push, make the same wrench as the first ones alone."""
+    kernel = Kernel("pushed")
+    pose, total = kernel.variable("pose", 6), kernel.variable("total", 6)
+    points, forces = _contacts(kernel, contacts, "")
+    reference, force, torque = (kernel.parameter(n, k) for n, k in (("reference", 4), ("force", 3), ("torque", 3)))
+    _, quaternion = placed(pose, reference)
+    to_object = rotation_matrix(conjugate(quaternion))
+    push = ca.vertcat(ca.mtimes(to_object, force), ca.mtimes(to_object, torque))
+    kernel.constrain("sum", ca.vertcat(ca.sum2(forces), _torque(points, forces)) + push - total)
+    kernel.cost("force_regularisation", forces)
+    return kernel
+
+
+def force_change(contacts: int) -> Kernel:
+    """Change of the contact forces from one knot to the next."""
+    kernel = Kernel("force_change")
+    before, after = kernel.variable("before", 3 * contacts), kernel.variable("after", 3 * contacts)
+    kernel.cost("force_change", after - before)
+    return kernel
+
+
+def stay_on_path() -> Kernel:
+    """The object near the motion of the whole-hand stage at one knot."""
+    kernel = Kernel("stay_path")
+    pose, wanted = kernel.variable("pose", 6), kernel.parameter("wanted", 6)
+    kernel.cost("stay_path", pose - wanted)
+    return kernel
+
+
+def ground_contact() -> Kernel:
+    """The object's contact with the ground at one knot; the ground's normal is the world's z.
+
+    Constraints: ``on_surfaces`` (2: off the object, off the ground), ``opposed`` (2), ``facing`` (1), ``pressing``
+    (1) and ``cone`` (1), as a finger's contact has them.
+    """
+    kernel = Kernel("ground")
+    pose, point, force = kernel.variable("pose", 6), kernel.variable("point", 3), kernel.variable("force", 3)
+    reference, capsule = kernel.parameter("reference", 4), kernel.parameter("capsule", 7)
+    height, friction = kernel.parameter("height"), kernel.parameter("friction")
+    wanted_point, wanted_force = kernel.parameter("wanted_point", 3), kernel.parameter("wanted_force", 3)
+    position, quaternion = placed(pose, reference)
+    rotation = rotation_matrix(quaternion)
+    off_object, normal = smooth_surface(point, capsule[:3], capsule[3:6], capsule[6])
+    outward, exerted = ca.mtimes(rotation, normal), ca.mtimes(rotation, force)
+    above = position[2] + ca.dot(rotation[2, :].T, point) - height
+    kernel.constrain("on_surfaces", ca.vertcat(off_object, above))
+    kernel.constrain("opposed", outward[:2])
+    kernel.constrain("facing", outward[2])
+    kernel.constrain("pressing", exerted[2])
+    kernel.constrain("cone", (friction * exerted[2]) ** 2 - ca.sumsqr(exerted[:2]))
+    kernel.cost("stay_point", point - wanted_point)
+    kernel.cost("stay_force", force - wanted_force)
+    return kernel
+
+
+def ground_held() -> Kernel:
+    """A second force in the ground's cone at one knot."""
+    kernel = Kernel("ground_held")
+    pose, force = kernel.variable("pose", 6), kernel.variable("force", 3)
+    reference, friction = kernel.parameter("reference", 4), kernel.parameter("friction")
+    _, quaternion = placed(pose, reference)
+    exerted = ca.mtimes(rotation_matrix(quaternion), force)
+    kernel.constrain("pressing", exerted[2])
+    kernel.constrain("cone", (friction * exerted[2]) ** 2 - ca.sumsqr(exerted[:2]))
+    return kernel
+
+
+def ground_rolling() -> Kernel:
+    """The object's contact with the ground from one knot to the next: it rolls or stands, and does not slip."""
+    kernel = Kernel("ground_rolling")
+    ends = [(kernel.variable(f"pose{i}", 6), kernel.variable(f"point{i}", 3)) for i in range(2)]
+    reference, step = kernel.parameter("reference", 4), kernel.parameter("step")
+    seen = []
+    for pose, point in ends:
+        position, quaternion = placed(pose, reference)
+        rotation = rotation_matrix(quaternion)
+        seen.append((rotation, point, position + ca.mtimes(rotation, point)))
+    (rotation0, point0, world0), (rotation1, point1, world1) = seen
+    over_object = ca.mtimes(rotation0 + rotation1, point1 - point0) / 2
+    slip = (over_object - world1 + world0)[:2]
+    kernel.constrain("no_slip", slip)
+    kernel.cost("slip", slip / step)
+    return kernel
+
+
+def object_apart(primitives: int, grounded: bool) -> Kernel:
+    """The object clear of the palm, and above the ground if there is one, at one knot."""
+    kernel = Kernel("object_apart")
+    pose = kernel.variable("pose", 6)
+    reference, palm_position, palm_quaternion = (
+        kernel.parameter(n, k) for n, k in (("reference", 4), ("palm_position", 3), ("palm_quaternion", 4))
+    )
+    palm_radius, ground = kernel.parameter("palm_radius"), kernel.parameter("ground")
+    shapes = ca.reshape(kernel.parameter("primitives", 7 * primitives), 7, primitives)
+    position, quaternion = placed(pose, reference)
+    rotation, to_palm = rotation_matrix(quaternion), rotation_matrix(conjugate(palm_quaternion))
+    palm, above = [], []
+    for k in range(primitives):
+        start, end = (position + ca.mtimes(rotation, shapes[i : i + 3, k]) for i in (0, 3))
+        for point in (start, (start + end) / 2, end):
+            seen = ca.mtimes(to_palm, point - palm_position)
+            palm.append(point_disc_distance(seen, palm_radius) - shapes[6, k])
+        above += [point[2] - shapes[6, k] - ground for point in (start, end)]
+    kernel.constrain("palm", ca.vertcat(*palm))
+    if grounded:
+        kernel.constrain("ground", ca.vertcat(*above))
+    return kernel
+
+
+def tool_point() -> Kernel:
+    """How far (3,) the object's tool is from where it must be at one knot of a drawing."""
+    kernel = Kernel("tool_point")
+    pose = kernel.variable("pose", 6)
+    reference, tool, target = (
+        kernel.parameter("reference", 4),
+        kernel.parameter("tool", 3),
+        kernel.parameter("target", 3),
+    )
+    position, quaternion = placed(pose, reference)
+    kernel.constrain("on_path", position + ca.mtimes(rotation_matrix(quaternion), tool) - target)
+    return kernel

@@ -1,0 +1,270 @@
+"""The refine stage's problem: its variables, and every block bound to its knots."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from casadi_hands.nlp import Problem, Rows
+from casadi_hands.stages import exact_kernels as finger
+from casadi_hands.stages import exact_object as body
+from casadi_hands.stages.model import Model
+from casadi_hands.stages.object_side import GOAL_TOLERANCE, MOST_FORCE
+from casadi_hands.stages.synthesis import AXIS_RANGE
+
+JOINT_MARGIN = 0.005  # rad, so that a smooth curve through the knots stays within the limits between them
+CLEARANCE = 0.02  # half extents, asked of bodies that do not touch
+_FREE = (-np.inf, np.inf)
+_HELD = {"pressing": (0.0, np.inf), "cone": (0.0, np.inf)}
+
+
+@dataclass(frozen=True)
+class Structure:
+    """What a refine problem is built for.
+
+    Attributes:
+        model: the task.
+        contacts: index of each finger's contact.
+        joints: of each finger.
+        active: (S, columns) which contact touches, held from its knot to the next: the fingers', then, if the ground
+            ever carries load, the ground's.
+    """
+
+    model: Model
+    contacts: tuple[int, ...]
+    joints: tuple[int, ...]
+    active: NDArray[np.bool_]
+
+    @classmethod
+    def of(
+        cls, model: Model, contacts: tuple[int, ...], joints: tuple[int, ...], active: NDArray[np.bool_]
+    ) -> Structure:
+        """Pick the columns in use from the flags (S, C) of all contacts, the ground's last."""
+        columns = list(contacts)
+        if model.ground is not None and active[:, -1].any():
+            columns.append(model.contacts)
+        return cls(model, contacts, joints, active[:, columns])
+
+    @property
+    def columns(self) -> list[int]:
+        """Index of every contact in use, in the order of the problem's points and forces."""
+        return [*self.contacts, *([self.model.contacts] if self.grounded else [])]
+
+    @property
+    def grounded(self) -> bool:
+        """Whether the ground ever carries load."""
+        return bool(self.active.shape[1] > len(self.contacts))
+
+    @property
+    def touching(self) -> NDArray[np.bool_]:
+        """(S, columns) where bodies touch: from the first active knot to the first broken one."""
+        return np.asarray(self.active | np.vstack([np.zeros((1, self.active.shape[1]), bool), self.active[:-1]]))
+
+
+class RefineProblem:
+    """The problem of one structure; ``problem`` holds it, the rest are the rows that kernels read."""
+
+    def __init__(self, structure: Structure) -> None:
+        """Declare variables and parameters and bind every block."""
+        self.structure, self.problem = structure, Problem()
+        model = structure.model
+        self.knots = len(model.schedule.samples)
+        self.pushed = pushed_knots(model)
+        self._declare_variables()
+        self._declare_parameters()
+        self._bind_physics()
+        self._bind_object()
+        if structure.grounded:
+            self._bind_ground()
+        for i in range(len(structure.contacts)):
+            self._bind_contact(i)
+            self._bind_clearance(i)
+            self._bind_shape(i)
+            for j in range(i):
+                self._bind_pair(i, j)
+
+    # Variables and parameters.
+
+    def _declare_variables(self) -> None:
+        problem, structure, model = self.problem, self.structure, self.structure.model
+        count, width = self.knots, 3 * len(structure.columns)
+        self.pose = problem.variable("pose", (count, 6))
+        self.rate = problem.variable("rate", (count, 6))
+        self.point = problem.variable("point", (count, width))
+        self.force = problem.variable("force", (count, width), -MOST_FORCE, MOST_FORCE)
+        self.wrench = problem.variable("wrench", (count, 6))
+        self.middle = problem.variable("middle_torque", (count - 1, 3))
+        if len(self.pushed):
+            shape = (len(self.pushed), width)
+            self.push = problem.variable("force_pushed", shape, -MOST_FORCE, MOST_FORCE)
+        lowest, highest = model.joint_limits
+        reach = model.palm_radius
+        self.angles, self.shape = [], []
+        for c, n in zip(structure.contacts, structure.joints, strict=True):
+            limits = lowest + JOINT_MARGIN, highest - JOINT_MARGIN
+            self.angles.append(problem.variable(f"angles{c}", (count, n), *limits))
+            self.shape.append(
+                [
+                    problem.variable(f"base{c}", (1, 2), -reach, reach),
+                    problem.variable(f"lengths{c}", (1, n), *model.link_length),
+                    problem.variable(f"axes{c}", (1, 2 * n), -AXIS_RANGE, AXIS_RANGE),
+                ]
+            )
+
+    def _declare_parameters(self) -> None:
+        problem, structure, count = self.problem, self.structure, self.knots
+        widths = {"reference": 4, "gravity": 3, "inertial": 1, "inertia": 9, "inverse": 9, "radius": 1}
+        widths |= {
+            "palm_radius": 1,
+            "ground_height": 1,
+            "friction": 1,
+            "primitives": 7 * len(structure.model.primitives),
+        }
+        for name, width in widths.items():
+            problem.parameter(name, (1, width))
+        problem.parameter("step", (count - 1, 1))
+        for name, width in (("palm_position", 3), ("palm_quaternion", 4), ("wanted_pose", 6)):
+            problem.parameter(name, (count, width))
+        for c in structure.columns:
+            problem.parameter(f"capsule{c}", (1, 7))
+            for name in ("wanted_point", "wanted_force"):
+                problem.parameter(f"{name}{c}", (count, 3))
+        for c, n in zip(structure.contacts, structure.joints, strict=True):
+            problem.parameter(f"helper{c}", (count, 3))
+            for name, width in (("frames", 9 * n), ("wanted_base", 2), ("wanted_lengths", n), ("wanted_axes", 2 * n)):
+                problem.parameter(f"{name}{c}", (1, width))
+
+    def _at(self, names: tuple[str, ...], knots: NDArray[np.int64] | None = None) -> list[NDArray[np.int64]]:
+        """Positions of parameters, of those that differ from knot to knot only the rows of ``knots``."""
+        positions = [self.problem.parameters[name] for name in names]
+        return [p if knots is None or len(p) == 1 else p[knots] for p in positions]
+
+    # The object.
+
+    def _bind_physics(self) -> None:
+        problem, columns = self.problem, len(self.structure.columns)
+        now, later = np.arange(self.knots - 1), np.arange(1, self.knots)
+        states = [r.take(k) for k in (now, later) for r in (self.pose, self.rate)]
+        wrenches = [self.wrench.take(now), self.wrench.take(later), self.middle]
+        common = self._at(("reference", "step", "gravity", "inertial", "inertia", "inverse"))
+        problem.bind(body.physics(), [*states, *wrenches], common, {"defect": (0, 0)})
+        problem.bind(body.wrench(columns), [self.wrench, self.point, self.force], [], {"sum": (0, 0)})
+        ends = [r.take(k) for k in (now, later) for r in (self.point, self.force)]
+        problem.bind(body.middle_torque(columns), [self.middle, *ends], [], {"sum": (0, 0)})
+        problem.bind(body.force_change(columns), [self.force.take(now), self.force.take(later)])
+        problem.bind(body.stay_on_path(), [self.pose], self._at(("wanted_pose",)))
+        if len(self.pushed):
+            for kind in ("force", "torque"):
+                problem.parameter(f"push_{kind}", (len(self.pushed), 3))
+            rows = [self.pose.take(self.pushed), self.wrench.take(self.pushed), self.point.take(self.pushed), self.push]
+            external = self._at(("reference", "push_force", "push_torque"))
+            problem.bind(body.pushed(columns), rows, external, {"sum": (0, 0)})
+
+    def _bind_object(self) -> None:
+        problem, model = self.problem, self.structure.model
+        kernel = body.object_apart(len(model.primitives), model.ground is not None)
+        places = ("reference", "palm_position", "palm_quaternion", "palm_radius", "ground_height", "primitives")
+        bounds = {"palm": (CLEARANCE, np.inf), "ground": (-GOAL_TOLERANCE, np.inf)}
+        problem.bind(kernel, [self.pose], self._at(places), bounds)
+        if model.tool is not None:
+            problem.parameter("tool", (1, 3))
+            problem.parameter("tool_path", (self.knots, 3))
+            parameters = self._at(("reference", "tool", "tool_path"))
+            problem.bind(body.tool_point(), [self.pose], parameters, {"on_path": _FREE})
+
+    def _bind_ground(self) -> None:
+        problem, structure = self.problem, self.structure
+        problem.parameter("ground_friction", (1, 1))
+        column, c = len(structure.contacts), structure.columns[-1]
+        span = 3 * column, 3 * column + 3
+        touching = np.flatnonzero(structure.touching[:, column])
+        rows = [r.take(touching) for r in (self.pose, self.point.entries(*span), self.force.entries(*span))]
+        names = ("reference", f"capsule{c}", "ground_height", "ground_friction", f"wanted_point{c}", f"wanted_force{c}")
+        surfaces = {"on_surfaces": (0, 0), "opposed": (0, 0), "facing": (-np.inf, -0.5)}
+        problem.bind(body.ground_contact(), rows, self._at(names, touching), surfaces | _HELD)
+        start = np.flatnonzero(structure.active[:-1, column])
+        rows = [r.take(k) for k in (start, start + 1) for r in (self.pose, self.point.entries(*span))]
+        problem.bind(body.ground_rolling(), rows, self._at(("reference", "step"), start), {"no_slip": _FREE})
+        pushed = np.flatnonzero(structure.active[self.pushed, column])
+        if len(pushed):
+            rows = [self.pose.take(self.pushed[pushed]), self.push.take(pushed).entries(*span)]
+            problem.bind(body.ground_held(), rows, self._at(("reference", "ground_friction")), _HELD)
+
+    # The fingers.
+
+    def _scene(self, c: int, knots: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+        return self._at(("reference", "palm_position", "palm_quaternion", f"capsule{c}", "radius"), knots)
+
+    def _bind_contact(self, i: int) -> None:
+        problem, structure = self.problem, self.structure
+        c, n, torque = structure.contacts[i], structure.joints[i], structure.model.torque_limit
+        frames, shape, span = self._at((f"frames{c}",)), self.shape[i], (3 * i, 3 * i + 3)
+        point, angles = self.point.entries(*span), self.angles[i]
+        held = {**_HELD, "passive": _FREE, "torque": (-torque, torque)}  # torque is bound only where the task limits it
+
+        def rows(knots: NDArray[np.int64], *of: Rows) -> list[Rows]:
+            return [*[r.constant(len(knots)) for r in shape], *[r.take(knots) for r in of]]
+
+        touching = np.flatnonzero(structure.touching[:, i])
+        parameters = [*frames, *self._scene(c, touching)]
+        parameters += self._at((f"helper{c}", "friction", f"wanted_point{c}", f"wanted_force{c}"), touching)
+        surfaces = {"on_surfaces": (0, 0), "opposed": (0, 0), "facing": (-np.inf, -0.5)}
+        kernel = finger.contact(n, c, np.isfinite(torque))
+        variables = rows(touching, self.pose, point, self.force.entries(*span), angles)
+        problem.bind(kernel, variables, parameters, surfaces | held)
+        pushed = np.flatnonzero(structure.active[self.pushed, i])
+        if len(pushed):
+            knots = self.pushed[pushed]
+            variables = [*rows(knots, self.pose, point, angles), self.push.take(pushed).entries(*span)]
+            parameters = [*frames, *self._scene(c, knots), *self._at(("friction",))]
+            problem.bind(finger.held(n, c, np.isfinite(torque)), variables, parameters, held)
+        start = np.flatnonzero(structure.active[:-1, i])
+        variables = rows(start, self.pose, point, angles)
+        variables += [r.take(start + 1) for r in (self.pose, point, angles)]
+        parameters = [*frames, *self._scene(c, start), *self._scene(c, start + 1)]
+        parameters += self._at((f"helper{c}", "step"), start)
+        problem.bind(finger.rolling(n, c), variables, parameters, {"no_slip": _FREE})
+
+    def _bind_clearance(self, i: int) -> None:
+        problem, structure, model = self.problem, self.structure, self.structure.model
+        c, n = structure.contacts[i], structure.joints[i]
+        touched = int(np.argmin(np.abs(model.primitives - model.capsules[c]).sum(axis=1)))
+        touching = structure.touching[:, i]
+        for knots, skipped in ((np.flatnonzero(touching), touched), (np.flatnonzero(~touching), None)):
+            if len(knots):
+                kernel = finger.apart(n, len(model.primitives), c, skipped, model.ground is not None)
+                rows = [r.constant(len(knots)) for r in self.shape[i]]
+                rows += [self.pose.take(knots), self.angles[i].take(knots)]
+                names = ("reference", "palm_position", "palm_quaternion", "radius", "palm_radius", "ground_height")
+                parameters = self._at((f"frames{c}", *names, "primitives"), knots)
+                problem.bind(kernel, rows, parameters, {"clear": (CLEARANCE, np.inf)})
+
+    def _bind_shape(self, i: int) -> None:
+        """A finger's morphology, and its joints' motion: mirrored at both ends, so that it starts and ends at rest."""
+        problem, structure, model, count = self.problem, self.structure, self.structure.model, self.knots
+        c, n, speed = structure.contacts[i], structure.joints[i], model.speed_limit
+        inner = np.arange(-1, count + 1)
+        mirrored = np.where(inner < 0, 1, np.where(inner >= count, count - 2, inner))
+        three = [self.angles[i].take(mirrored[offset : offset + count]) for offset in range(3)]
+        steps = self._at(("step",), np.clip(np.arange(count) - 1, 0, count - 2))
+        problem.bind(finger.joint_motion(n, c, np.isfinite(speed)), three, steps, {"speed": (-speed, speed)})
+        wanted = self._at((f"wanted_base{c}", f"wanted_lengths{c}", f"wanted_axes{c}"))
+        reach = (model.palm_radius - model.link_radius) ** 2
+        problem.bind(finger.stay(n, c), self.shape[i], wanted, {"on_palm": (0, reach)})
+
+    def _bind_pair(self, i: int, j: int) -> None:
+        structure = self.structure
+        c, d = structure.contacts[i], structure.contacts[j]
+        rows: list[Rows] = []
+        for k in (i, j):
+            rows += [*[r.constant(self.knots) for r in self.shape[k]], self.angles[k]]
+        kernel = finger.fingers_apart(structure.joints[i], structure.joints[j], f"{c}_{d}")
+        parameters = self._at((f"frames{c}", f"frames{d}", "radius"))
+        self.problem.bind(kernel, rows, parameters, {"clear": (CLEARANCE, np.inf)})
+
+
+def pushed_knots(model: Model) -> NDArray[np.int64]:
+    """Knots at which the task's perturbations act."""
+    return np.flatnonzero(np.any(np.hstack([model.perturbation_force, model.perturbation_torque]), axis=1))
