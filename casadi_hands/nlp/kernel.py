@@ -18,21 +18,21 @@ class Kernel:
     def __init__(self, name: str) -> None:
         """Start without variables, parameters or terms; ``name`` appears in errors and names the constraints."""
         self.name = name
-        self._variables: list[SX] = []
-        self._parameters: list[SX] = []
+        self._variables: list[tuple[str, SX]] = []
+        self._parameters: list[tuple[str, SX]] = []
         self.terms: dict[str, SX] = {}
         self.constraints: dict[str, SX] = {}
 
     def variable(self, name: str, size: int) -> SX:
         """A local variable (size,), to be bound to rows of the problem's variables in the order of declaration."""
         symbol = SX.sym(name, size)
-        self._variables.append(symbol)
+        self._variables.append((name, symbol))
         return symbol
 
     def parameter(self, name: str, size: int = 1) -> SX:
         """A local parameter (size,), bound to entries of the problem's parameters in the order of declaration."""
         symbol = SX.sym(name, size)
-        self._parameters.append(symbol)
+        self._parameters.append((name, symbol))
         return symbol
 
     def cost(self, name: str, residual: SX, form: Literal["square", "sum"] = "square") -> None:
@@ -43,19 +43,26 @@ class Kernel:
 
     def constrain(self, name: str, expression: SX) -> None:
         """Add a constraint (n,); its bounds are given when the kernel is bound."""
+        if name in self.constraints:
+            raise KeyError(f"kernel '{self.name}' already has a constraint '{name}'")
         self.constraints[name] = expression
 
     @property
     def variables(self) -> SX:
         """All local variables in one column."""
-        return ca.vertcat(*self._variables)
+        return ca.vertcat(*[symbol for _, symbol in self._variables])
 
     @property
     def parameters(self) -> SX:
         """All local parameters in one column."""
-        return ca.vertcat(*self._parameters)
+        return ca.vertcat(*[symbol for _, symbol in self._parameters])
 
     @property
     def variable_sizes(self) -> list[tuple[str, int]]:
         """Name and size of each local variable."""
-        return [(symbol[0].name().rsplit("_", 1)[0], symbol.numel()) for symbol in self._variables]
+        return [(name, symbol.numel()) for name, symbol in self._variables]
+
+    @property
+    def parameter_sizes(self) -> list[tuple[str, int]]:
+        """Name and size of each local parameter."""
+        return [(name, symbol.numel()) for name, symbol in self._parameters]

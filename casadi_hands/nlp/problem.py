@@ -86,12 +86,13 @@ class Problem:
             variables: for each local variable the rows (K, d) it reads.
             parameters: for each local parameter positions (K, d), or (1, d) where all instances share it.
             bounds: lower and upper bound of each constraint, broadcast to its length in every instance.
+
+        Raises:
+            ValueError: arguments that are not one for each of the kernel's symbols, or not of its size.
         """
-        count = variables[0].count
-        sizes = kernel.variable_sizes
-        for (name, size), rows in zip(sizes, variables, strict=True):
-            if rows.count != count or rows.width != size:
-                raise ValueError(f"{kernel.name}.{name}: rows ({rows.count}, {rows.width}), expected ({count}, {size})")
+        count, sizes = variables[0].count, kernel.variable_sizes
+        _check_shapes(kernel.name, sizes, [(rows.count, rows.width) for rows in variables], (count,))
+        _check_shapes(kernel.name, kernel.parameter_sizes, [p.shape for p in parameters], (count, 1))
         columns = self.variables.size
         blocks = [sparse.csr_array(r.matrix.copy()) for r in variables]
         for block in blocks:
@@ -102,8 +103,6 @@ class Problem:
         assert selector.shape[0] == width * count
         parts = [np.broadcast_to(p, (count, p.shape[1])) for p in parameters]
         positions = np.hstack(parts) if parts else np.zeros((count, 0), int)
-        if positions.shape[1] != kernel.parameters.numel():
-            raise ValueError(f"{kernel.name}: {positions.shape[1]} parameters, expected {kernel.parameters.numel()}")
         terms = list(kernel.terms)
         for term in terms:
             if f"weight.{term}" not in self.parameters:
@@ -202,6 +201,17 @@ class Problem:
                 parts.append(scatter_hessian(bound.selector, bound.count, pattern))
                 sources.append(ca.vec(bound.functions.hessian.map(bound.count)(*arguments, scales, local)))
         return gather_nonzeros((self.variables.size, self.variables.size), parts, sources)
+
+
+def _check_shapes(
+    kernel: str, sizes: list[tuple[str, int]], shapes: Sequence[tuple[int, ...]], counts: tuple[int, ...]
+) -> None:
+    """Refuse arguments whose shapes are not (one of ``counts``, size), one for each name."""
+    if len(shapes) != len(sizes):
+        raise ValueError(f"{kernel}: {len(shapes)} given, expected {', '.join(name for name, _ in sizes) or 'none'}")
+    for (name, size), shape in zip(sizes, shapes, strict=True):
+        if shape not in [(count, size) for count in counts]:
+            raise ValueError(f"{kernel}.{name}: rows {shape}, expected ({counts[0]}, {size})")
 
 
 def _interleave(sizes: list[int], count: int) -> NDArray[np.int64]:

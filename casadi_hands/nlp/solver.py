@@ -43,6 +43,9 @@ class Options:
 class Solution:
     """What one solve returned, by name; a solve that stopped early is a value too.
 
+    All numbers are computed at ``values``. A term, objective or violation that is not a number is infinite, so that
+    such a solution ranks last and meets nothing.
+
     Attributes:
         values: variable -> array.
         terms: cost term -> weighted value.
@@ -51,7 +54,7 @@ class Solution:
         violations: ``kernel.constraint`` -> its largest violation.
         constraints: ``kernel.constraint`` -> its values, one row an instance.
         status: IPOPT's own words; never taken as proof.
-        iterations: number of iterations.
+        iterations: number of iterations; 0 where IPOPT did not start.
         seconds: wall time.
         multipliers: of bounds and constraints, to warm-start the next solve.
     """
@@ -153,21 +156,24 @@ class Solver:
     def _solution(
         self, answer: dict[str, Any], p: Vector, bounds: tuple[Vector, Vector], stats: dict[str, Any], seconds: float
     ) -> Solution:
-        problem = self.problem
-        x, g = (np.asarray(answer[name]).reshape(-1) for name in ("x", "g"))
-        beyond = np.maximum(bounds[0] - g, g - bounds[1])
+        problem, x = self.problem, np.asarray(answer["x"]).reshape(-1)
+        # IPOPT's own f and g are left as they were where it stops before it evaluates them.
+        f, g = (np.asarray(value).reshape(-1) for value in self.functions["nlp"](x, p))
+        finite = np.isfinite(g)
+        low, high = (bound - np.where(finite, g, 0.0) for bound in bounds)
+        beyond = np.where(finite, np.maximum(np.maximum(low, -high), 0.0), np.inf)
         terms = np.asarray(self.functions["terms"](x, p)).reshape(-1)
+        terms[~np.isfinite(terms)] = np.inf
         return Solution(
             values=problem.variables.unpack(x),
             terms=dict(zip(problem.terms, terms.tolist(), strict=True)),
-            objective=float(answer["f"]),
-            violation=float(max(beyond.max(initial=0.0), 0.0)),
-            violations={
-                name: float(max(beyond[rows].max(initial=0.0), 0.0)) for name, rows in problem.constraint_rows.items()
-            },
+            objective=float(f[0]) if np.isfinite(f[0]) else np.inf,
+            violation=float(beyond.max(initial=0.0)),
+            violations={name: float(beyond[rows].max(initial=0.0)) for name, rows in problem.constraint_rows.items()},
             constraints={name: g[rows] for name, rows in problem.constraint_rows.items()},
             status=str(stats["return_status"]),
-            iterations=int(stats["iter_count"]),
+            # CasADi sets the count with the record of iterations; without one it is whatever memory held.
+            iterations=int(stats["iter_count"]) if "iterations" in stats else 0,
             seconds=seconds,
             multipliers={name: np.asarray(answer[f"lam_{name}"]).reshape(-1) for name in ("x", "g")},
         )

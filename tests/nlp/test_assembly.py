@@ -154,9 +154,40 @@ def test_a_kernel_bound_to_wrong_rows_is_refused() -> None:
         problem.bind(pull(), [narrow])
     wide = problem.variable("wide", (4, 2))
     three = problem.variable("three", (4, 3))
-    with pytest.raises(ValueError, match="spring: 2 parameters, expected 3"):
-        problem.bind(spring(), [wide, three], [problem.parameter("own", (4, 2))])
+    with pytest.raises(ValueError, match=r"spring: 1 given, expected a, b"):
+        problem.bind(spring(), [wide])
+    own, shared = problem.parameter("own", (4, 2)), problem.parameter("shared", (1, 1))
+    with pytest.raises(ValueError, match="spring: 1 given, expected own, shared"):
+        problem.bind(spring(), [wide, three], [own])
+    with pytest.raises(ValueError, match="pull: 1 given, expected none"):
+        problem.bind(pull(), [three], [own])
+    # Three in all, as asked, but not one by one.
+    with pytest.raises(ValueError, match=r"spring\.own: rows \(1, 1\), expected \(4, 2\)"):
+        problem.bind(spring(), [wide, three], [shared, own])
+    with pytest.raises(ValueError, match=r"spring\.own: rows \(3, 2\), expected \(4, 2\)"):
+        problem.bind(spring(), [wide, three], [own[:3], shared])
+    # Nothing of what was refused is left behind.
+    assert problem.constraints.size == 0
+    assert problem.terms == []
+
+
+def test_a_kernel_names_nothing_twice() -> None:
     kernel = Kernel("twice")
-    kernel.cost("once", kernel.variable("x", 1))
+    x = kernel.variable("x", 1)
+    kernel.cost("once", x)
     with pytest.raises(KeyError, match="kernel 'twice' already has a term 'once'"):
         kernel.cost("once", ca.SX(0))
+    kernel.constrain("positive", x)
+    with pytest.raises(KeyError, match="kernel 'twice' already has a constraint 'positive'"):
+        kernel.constrain("positive", -x)
+    assert kernel.constraints["positive"] is x
+
+
+def test_a_kernel_s_symbols_keep_their_names_and_sizes() -> None:
+    kernel = Kernel("names")
+    kernel.variable("of_one", 1)
+    kernel.variable("of_two", 2)
+    kernel.parameter("palm_radius")
+    kernel.parameter("inertia", 9)
+    assert kernel.variable_sizes == [("of_one", 1), ("of_two", 2)]
+    assert kernel.parameter_sizes == [("palm_radius", 1), ("inertia", 9)]

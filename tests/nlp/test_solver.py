@@ -125,6 +125,61 @@ def test_an_iteration_cap_ends_with_a_value() -> None:
     assert np.isfinite(stopped.values["points"]).all()
 
 
+NOT_STARTED = {
+    "a start that is no number": ({"points": np.nan}, {}),
+    "a target that is no number": ({}, {"targets": np.nan}),
+    "an infinite target": ({}, {"targets": np.inf}),
+    "a weight that is no number": ({}, {"weight.near": np.nan}),
+}
+
+
+@pytest.mark.parametrize("case", NOT_STARTED)
+def test_a_solve_that_ipopt_does_not_start_ranks_last(case: str, solution: Solution) -> None:
+    start, parameters = NOT_STARTED[case]
+    solver = Solver(chain())
+    for _ in range(2):  # the second time after a solve that went well
+        stopped = solver.solve(start, {"targets": TARGETS, **WEIGHTS, **parameters}, EXACT)
+        assert stopped.status == "Invalid_Number_Detected"
+        assert stopped.objective == np.inf
+        assert stopped.terms["near"] == np.inf
+        assert stopped.iterations == 0
+        assert min([stopped, solution], key=lambda each: each.objective) is solution
+        # At the origin, where a start left out begins, each point is a whole squared radius inside its circle.
+        expected = np.inf if start else 1.0
+        assert stopped.violation == stopped.violations["outside.radius"] == expected
+        assert solver.solve({}, {"targets": TARGETS, **WEIGHTS}, EXACT).objective == pytest.approx(solution.objective)
+
+
+def test_numbers_are_those_of_the_point_returned_where_ipopt_evaluates_nothing() -> None:
+    # Two equations in one unknown: IPOPT gives up at once, and its record says nothing of f and g.
+    problem = Problem()
+    x = problem.variable("x", (1, 1))
+    kernel = Kernel("two")
+    local = kernel.variable("x", 1)
+    kernel.cost("square", local)
+    kernel.constrain("equations", ca.vertcat(local, local**2 + 1))
+    problem.bind(kernel, [x], [], {"equations": (2.0, 2.0)})
+    stopped = Solver(problem).solve({"x": 1.5}, {"weight.square": 1.0})
+    assert stopped.status == "Not_Enough_Degrees_Of_Freedom"
+    assert stopped.values["x"].tolist() == [[1.5]]
+    assert stopped.objective == stopped.terms["square"] == 1.5**2
+    assert stopped.constraints["two.equations"].tolist() == [[1.5, 3.25]]
+    assert stopped.violation == 1.25
+    assert stopped.iterations == 0
+
+
+def test_a_constraint_that_is_no_number_is_violated_without_bound() -> None:
+    problem = Problem()
+    x = problem.variable("x", (2, 1))
+    kernel = Kernel("root")
+    kernel.constrain("root", ca.sqrt(kernel.variable("x", 1)))
+    problem.bind(kernel, [x], [], {"root": (-np.inf, np.inf)})
+    stopped = Solver(problem).solve({"x": [[-1.0], [4.0]]}, {})
+    assert stopped.violation == stopped.violations["root.root"] == np.inf
+    assert stopped.constraints["root.root"][1, 0] == 2.0
+    assert stopped.objective == 0
+
+
 def test_constraints_by_name_and_with_other_bounds(solution: Solution) -> None:
     radii = (solution.values["points"] ** 2).sum(axis=1)
     np.testing.assert_allclose(solution.constraints["outside.radius"].ravel(), radii, atol=1e-12)
