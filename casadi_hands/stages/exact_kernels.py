@@ -12,7 +12,7 @@ from casadi_hands.nlp import Kernel
 from casadi_hands.stages.finger_symbols import FingerSymbols, PlacedFinger, morphology
 from casadi_hands.stages.hand_kernels import distances
 from casadi_hands.stages.kernels import placed
-from casadi_hands.stages.surface import smooth_surface, tangents
+from casadi_hands.stages.surface import from_axis, smooth_surface, tangents
 from casadi_hands.terms import clearance, finger
 
 LEVER_DAMPING = 0.04  # half extents/rad: forces that need a shorter lever than about this count as not supplied
@@ -29,9 +29,10 @@ class Touch:
 
     Attributes:
         on_link: (3,) the contact in the last link's frame.
-        off_object, off_link: signed distances of the contact from the two surfaces.
+        off_object: signed distance of the contact from the object's surface.
+        off_link: (3,) how far the link's axis is from a link's radius above the object's surface, object frame: zero
+            where surfaces touch with opposed normals, and linear in where the link is, so that none ends up inside.
         normal: (3,) outward from the object, object frame.
-        link_normal: (3,) outward from the link, in the object's frame.
         rotation: (3, 3) object axes to palm axes.
         placed: the finger with the contact as its point.
     """
@@ -40,7 +41,6 @@ class Touch:
     off_object: SX
     off_link: SX
     normal: SX
-    link_normal: SX
     rotation: SX
     placed: PlacedFinger
 
@@ -71,30 +71,29 @@ class Scene:
         on_link = ca.mtimes(skeleton.tip_rotation.T, in_palm - skeleton.origins[:, -1])
         off_object, normal = smooth_surface(point, self.capsule[:3], self.capsule[3:6], self.capsule[6])
         end = ca.vertcat(0, 0, symbols.lengths[-1])
-        off_link, link_normal = smooth_surface(on_link, SX.zeros(3, 1), end, self.radius)
-        in_object = ca.mtimes(rotation.T, ca.mtimes(skeleton.tip_rotation, link_normal))
+        from_link = ca.mtimes(rotation.T, ca.mtimes(skeleton.tip_rotation, from_axis(on_link, SX.zeros(3, 1), end)))
+        from_object = from_axis(point, self.capsule[:3], self.capsule[3:6])
+        off_link = from_link + self.radius / self.capsule[6] * from_object
         here = symbols.placed(angles, on_link)
-        return Touch(on_link, off_object, off_link, normal, in_object, rotation, here)
+        return Touch(on_link, off_object, off_link, normal, rotation, here)
 
 
 def contact(joints: int, index: int, limited: bool) -> Kernel:
     """One touching contact at one knot: on both surfaces, normals opposed, in the cone, supplied by the joints.
 
-    Constraints: ``on_surfaces`` (2), ``opposed`` (2), ``facing`` (1: cosine between the outward normals),
-    and those of ``_hold``. The cost of friction is the fourth power of the share in use.
+    Constraints: ``on_object`` (1), ``on_link`` (3: surface and normal, see ``Touch``) and those of ``_hold``.
+    The cost of friction is the fourth power of the share in use.
     """
     kernel = Kernel(f"contact{index}")
     symbols = free_morphology(kernel, joints)
     pose, point, force = kernel.variable("pose", 6), kernel.variable("point", 3), kernel.variable("force", 3)
     angles = kernel.variable("angles", joints)
     scene = Scene.declare(kernel)
-    helper, friction = kernel.parameter("helper", 3), kernel.parameter("friction")
+    friction = kernel.parameter("friction")
     wanted_point, wanted_force = kernel.parameter("wanted_point", 3), kernel.parameter("wanted_force", 3)
     touch = scene.touch(pose, point, angles, symbols)
-    first, second = tangents(touch.normal, helper)
-    kernel.constrain("on_surfaces", ca.vertcat(touch.off_object, touch.off_link))
-    kernel.constrain("opposed", ca.vertcat(ca.dot(first, touch.link_normal), ca.dot(second, touch.link_normal)))
-    kernel.constrain("facing", ca.dot(touch.normal, touch.link_normal))
+    kernel.constrain("on_object", touch.off_object)
+    kernel.constrain("on_link", touch.off_link)
     pressing, across, passive = _hold(kernel, touch, force, friction, limited)
     kernel.cost("passive_force", passive)
     kernel.cost("stay_point", point - wanted_point)

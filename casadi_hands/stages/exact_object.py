@@ -11,7 +11,7 @@ from casadi_hands.nlp import Kernel
 from casadi_hands.stages.kernels import placed
 from casadi_hands.stages.surface import smooth_surface
 
-SUBSTEPS = 4  # of the integration between two knots
+SUBSTEPS = 6  # of the integration between two knots
 
 
 def wrench(contacts: int) -> Kernel:
@@ -113,6 +113,14 @@ def stay_on_path() -> Kernel:
     return kernel
 
 
+def meet_goal() -> Kernel:
+    """The object's distance (6,) from a goal; the tolerance is there for where it is needed, not to be used up."""
+    kernel = Kernel("meet_goal")
+    pose, wanted = kernel.variable("pose", 6), kernel.parameter("wanted", 6)
+    kernel.cost("goal", pose - wanted)
+    return kernel
+
+
 def ground_contact() -> Kernel:
     """The object's contact with the ground at one knot; the ground's normal is the world's z.
 
@@ -203,5 +211,7 @@ def tool_point() -> Kernel:
         kernel.parameter("target", 3),
     )
     position, quaternion = placed(pose, reference)
-    kernel.constrain("on_path", position + ca.mtimes(rotation_matrix(quaternion), tool) - target)
+    off = position + ca.mtimes(rotation_matrix(quaternion), tool) - target
+    kernel.constrain("on_path", off)
+    kernel.cost("goal", off)
     return kernel

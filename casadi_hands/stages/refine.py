@@ -11,13 +11,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from casadi_hands.nlp import Options, Solution, Solver
 from casadi_hands.stages.model import Model
 from casadi_hands.stages.object_side import MOST_FORCE, MOST_TURN, NO_GROUND, tool_path
 from casadi_hands.stages.refine_problem import RefineProblem, Structure
+from casadi_hands.stages.start import balanced, rates_and_wrenches
 from casadi_hands.stages.whole_hand import WholeHand
 
 Array = NDArray[np.float64]
@@ -27,7 +27,7 @@ _NEAR = (("nlp_scaling_method", "none"), ("bound_push", 1e-6), ("bound_frac", 1e
 SOFT = Options(max_iter=150, tol=1e-3, acceptable_tol=1e-2, constr_viol_tol=1e-4, mu_init=1e-3, extra=_NEAR)
 CLOSER = Options(max_iter=100, tol=1e-3, acceptable_tol=1e-2, constr_viol_tol=1e-6, mu_init=1e-6, extra=_NEAR)
 HARD = Options(max_iter=100, tol=1e-6, acceptable_tol=1e-5, constr_viol_tol=1e-10, mu_init=1e-6, extra=_NEAR)
-HARD_FROM_AFAR = Options(max_iter=200, tol=1e-6, acceptable_tol=1e-5, constr_viol_tol=1e-10, mu_init=1e-3, extra=_NEAR)
+HARD_FROM_AFAR = Options(max_iter=300, tol=1e-6, acceptable_tol=1e-5, constr_viol_tol=1e-10, mu_init=1e-4, extra=_NEAR)
 AFAR = 0.01  # half extents of slip that the firm solve leaves: more is much
 TOOL_TOLERANCE = 5e-3  # half extents, how far a drawing's tool may leave its path between goals
 ACCEPTED = 1e-7  # largest violation with which a refined motion is handed on
@@ -62,6 +62,7 @@ WEIGHTS = {
     "object_acceleration": 1e-2,
     "stay_design": 0.02,
     "stay_path": 1.0,
+    "goal": 300.0,
     "force_regularisation": 1e-3,
 }
 FIRM = {"slip": 100.0, "passive_force": 30.0}
@@ -176,16 +177,17 @@ class RefineStage:
         return {"pose": low_pose, **lower}, {"pose": high_pose, **upper}
 
     def _start(self, start: WholeHand) -> dict[str, Array]:
-        samples = self.model.schedule.samples
-        chosen = self.structure.columns
+        count, chosen = self.knots, self.structure.columns
+        rates, wrenches = rates_and_wrenches(self.model, start.position, start.vector)
+        points = start.point[:, chosen]
+        forces = balanced(points, start.force[:, chosen], self.structure.active, wrenches)
         values = {
             "pose": np.hstack([start.position, start.vector]),
-            "rate": np.hstack([np.gradient(start.position, samples, axis=0), self._spins(start)]),
-            "point": start.point[:, chosen].reshape(len(samples), -1),
-            "force": start.force[:, chosen].reshape(len(samples), -1),
+            "rate": rates,
+            "point": points.reshape(count, -1),
+            "force": forces.reshape(count, -1),
+            "wrench": np.hstack([forces.sum(axis=1), np.cross(points, forces).sum(axis=1)]),
         }
-        points, forces = (values[name].reshape(len(samples), -1, 3) for name in ("point", "force"))
-        values["wrench"] = np.hstack([forces.sum(axis=1), np.cross(points, forces).sum(axis=1)])
         halfway = [(a[1:] + a[:-1]) / 2 for a in (points, forces)]
         values["middle_torque"] = np.cross(*halfway).sum(axis=1)
         if len(self.pushed):
@@ -194,16 +196,6 @@ class RefineStage:
             values |= {f"angles{c}": angles, f"base{c}": finger.base, f"lengths{c}": finger.lengths}
             values[f"axes{c}"] = finger.axes.reshape(1, -1)
         return values
-
-    def _spins(self, start: WholeHand) -> Array:
-        """Angular velocities (S, 3), object frame, by central differences."""
-        samples = self.model.schedule.samples
-        reference = pin.Quaternion(*self.model.reference).matrix()
-        turns = [pin.exp3(v) @ reference for v in start.vector]
-        spins = np.zeros((len(samples), 3))
-        for k in range(1, len(samples) - 1):
-            spins[k] = pin.log3(turns[k - 1].T @ turns[k + 1]) / (samples[k + 1] - samples[k - 1])
-        return spins
 
     def _parameters(self, start: WholeHand, margin: Margin) -> dict[str, ArrayLike]:
         model = self.model
@@ -226,7 +218,9 @@ class RefineStage:
         if len(self.pushed):
             values["push_force"] = model.perturbation_force[self.pushed]
             values["push_torque"] = model.perturbation_torque[self.pushed]
-        if model.tool is not None:
+        if model.tool is None:
+            values["goals"] = np.hstack([model.goal_positions, model.goal_vectors])
+        else:
             values["tool"], values["tool_path"] = model.tool, tool_path(model)
         if self.structure.grounded and model.ground is not None:
             values["ground_friction"] = margin.friction * model.ground.friction

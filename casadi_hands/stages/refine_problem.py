@@ -168,7 +168,11 @@ class RefineProblem:
         places = ("reference", "palm_position", "palm_quaternion", "palm_radius", "ground_height", "primitives")
         bounds = {"palm": (CLEARANCE, np.inf), "ground": (-GOAL_TOLERANCE, np.inf)}
         problem.bind(kernel, [self.pose], self._at(places), bounds)
-        if model.tool is not None:
+        if model.tool is None:
+            goals = problem.parameter("goals", (len(model.goal_positions), 6))
+            at = model.schedule.keyframe_samples[list(model.schedule.goals)]
+            problem.bind(body.meet_goal(), [self.pose.take(at)], [goals])
+        else:
             problem.parameter("tool", (1, 3))
             problem.parameter("tool_path", (self.knots, 3))
             parameters = self._at(("reference", "tool", "tool_path"))
@@ -209,8 +213,8 @@ class RefineProblem:
 
         touching = np.flatnonzero(structure.touching[:, i])
         parameters = [*frames, *self._scene(c, touching)]
-        parameters += self._at((f"helper{c}", "friction", f"wanted_point{c}", f"wanted_force{c}"), touching)
-        surfaces = {"on_surfaces": (0, 0), "opposed": (0, 0), "facing": (-np.inf, -0.5)}
+        parameters += self._at(("friction", f"wanted_point{c}", f"wanted_force{c}"), touching)
+        surfaces = {"on_object": (0, 0), "on_link": (0, 0)}
         kernel = finger.contact(n, c, np.isfinite(torque))
         variables = rows(touching, self.pose, point, self.force.entries(*span), angles)
         problem.bind(kernel, variables, parameters, surfaces | held)
