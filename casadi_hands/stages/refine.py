@@ -188,8 +188,8 @@ class RefineStage:
             "force": forces.reshape(count, -1),
             "wrench": np.hstack([forces.sum(axis=1), np.cross(points, forces).sum(axis=1)]),
         }
-        halfway = [(a[1:] + a[:-1]) / 2 for a in (points, forces)]
-        values["middle_torque"] = np.cross(*halfway).sum(axis=1)
+        at, pushing = ((a[1:] + a[:-1]) / 2 for a in (points, forces))
+        values["middle_torque"] = np.cross(at, pushing).sum(axis=1)
         if len(self.pushed):
             values["force_pushed"] = values["force"][self.pushed]
         for c, finger, angles in zip(self.contacts, start.fingers, start.angles, strict=True):

@@ -214,7 +214,7 @@ class RefineProblem:
         touching = np.flatnonzero(structure.touching[:, i])
         parameters = [*frames, *self._scene(c, touching)]
         parameters += self._at(("friction", f"wanted_point{c}", f"wanted_force{c}"), touching)
-        surfaces = {"on_object": (0, 0), "on_link": (0, 0)}
+        surfaces = {"on_object": (0.0, 0.0), "on_link": (0.0, 0.0)}
         kernel = finger.contact(n, c, np.isfinite(torque))
         variables = rows(touching, self.pose, point, self.force.entries(*span), angles)
         problem.bind(kernel, variables, parameters, surfaces | held)

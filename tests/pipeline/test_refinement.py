@@ -54,7 +54,7 @@ def test_slip_is_laid_to_the_finger_that_slips_most() -> None:
     ("name", "violation", "words"),
     [
         ("contact0.passive", 0.25, "finger 'left' cannot supply its force with its joints at {}, by 0.25 weights"),
-        ("contact1.on_surfaces", 0.1, "finger 'right' cannot reach its contact at {}, by 3 mm"),
+        ("contact1.on_link", 0.1, "finger 'right' cannot reach its contact at {}, by 3 mm"),
         ("contact1.torque", 2.0, f"within the torque limit at {{}}, by {2 * TORQUE_UNIT:.2g} N·m"),
         ("joint_motion0.speed", 1.5, "finger 'left' cannot keep within the joints' speed limit at {}, by 1.5 rad/s"),
         ("fingers_apart1_0.clear", 0.1, "fingers 'left' and 'right' cannot stay clear of each other at {}, by 3 mm"),
@@ -74,7 +74,7 @@ def test_rows_are_the_samples_where_a_finger_touches() -> None:
     # It is off at 0.2, 0.3 and 0.4 s; a contact's point is on both bodies until the sample at which it lifts.
     rows = np.zeros((5, 2))
     rows[3, 0] = 0.2
-    (reason,) = refined_reason(ball(), refined(("contact0.on_surfaces", 0.2), rows, lifted=(2, 3, 4)))
+    (reason,) = refined_reason(ball(), refined(("contact0.on_link", 0.2), rows, lifted=(2, 3, 4)))
     assert " at 0.5 s " in reason.what
 
 
@@ -85,7 +85,7 @@ def test_no_force_is_asked_of_a_finger_that_has_lifted() -> None:
 
 
 def test_no_time_is_told_where_rows_are_not_samples() -> None:
-    (reason,) = refined_reason(ball(), refined(("contact0.on_surfaces", 0.1), np.ones((4, 2))))
+    (reason,) = refined_reason(ball(), refined(("contact0.on_link", 0.1), np.ones((4, 2))))
     assert reason.what.endswith("finger 'left' cannot reach its contact, by 3 mm")
 
 
