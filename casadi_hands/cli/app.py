@@ -71,6 +71,15 @@ def solve(
     seed: Annotated[
         int | None, typer.Option(min=0, help="Seed of the random numbers.", show_default="the task's")
     ] = None,
+    seeds: Annotated[
+        int,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Solve from N seeds, SEED and those that follow it; DIR holds the best hand and, in alternatives/, "
+            "up to four distinct ones.",
+        ),
+    ] = 1,
     jobs: Jobs = None,
     until: Annotated[Stage, typer.Option(help="Stop after this stage and write what there is.")] = Stage.REFINE,
 ) -> None:
@@ -81,7 +90,7 @@ def solve(
     """
     from casadi_hands.cli.interrupt import leave_on_interrupt
     from casadi_hands.cli.progress import Reporter
-    from casadi_hands.cli.summary import design_summary
+    from casadi_hands.cli.summary import alternatives_summary, design_summary
     from casadi_hands.task import load_task
 
     problem = load_task(task)
@@ -91,17 +100,34 @@ def solve(
     def stopped() -> None:
         reporter.stop()
         # Written last, so a folder that has it is complete.
-        complete = (folder / "result.json").is_file()
+        complete = any(folder.glob("result.json")) or any(folder.glob("alternatives/*/result.json"))
         reporter.note(f"stopped; {f'what was computed is in {folder}' if complete else 'no stage was complete'}")
 
     with leave_on_interrupt(stopped), reporter:
         # Within the reporter, because CasADi and Pinocchio take seconds to load.
-        from casadi_hands import pipeline
+        from casadi_hands import alternatives, pipeline
 
-        design = pipeline.solve(
-            problem, seed=seed, jobs=jobs, until=until.value, out=folder, progress=reporter.progress
-        )
-    Console().print(design_summary(design, folder))
+        if seeds > 1:
+            first = problem.search.seed if seed is None else seed
+            ranked = alternatives.explore(
+                problem,
+                seeds=range(first, first + seeds),
+                jobs=jobs,
+                until=until.value,
+                out=folder,
+                progress=reporter.progress,
+            )
+            design = ranked[0].design
+        else:
+            ranked = []
+            alternatives.remove_alternatives(folder)
+            design = pipeline.solve(
+                problem, seed=seed, jobs=jobs, until=until.value, out=folder, progress=reporter.progress
+            )
+    console = Console()
+    console.print(design_summary(design, folder))
+    if ranked:
+        console.print(alternatives_summary(ranked, folder))
     raise typer.Exit(1 if design.status == "failed" else 0)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from rich.text import Text
 from casadi_hands.verify.report import show
 
 if TYPE_CHECKING:
+    from casadi_hands.alternatives import Alternative
     from casadi_hands.design import Design
     from casadi_hands.verify import Audit, Replay
 
@@ -39,6 +41,27 @@ def design_summary(design: Design, folder: Path) -> RenderableType:
     if design.motion is not None:
         parts.append(Text(f"see it move: casadi-hands view {folder}"))
     return Group(*parts)
+
+
+def alternatives_summary(ranked: Sequence[Alternative], folder: Path) -> RenderableType:
+    """What each seed gave, best first, and where it is."""
+    table = Table("seed", "status", "joints", box=SIMPLE_HEAD)
+    for column in ("margin %", "torque N·m"):
+        table.add_column(column, justify="right", no_wrap=True)
+    table.add_column(f"in {folder}", overflow="fold")
+    for one in ranked:
+        design = one.design
+        table.add_row(
+            str(one.seed),
+            Text(design.status, _STYLES[design.status]),
+            "+".join(map(str, one.joints)),
+            # Of a limit that is missed by much the share says nothing to a reader.
+            f"{100 * one.margin:.0f}" if one.margin >= 0 else "",
+            f"{one.torque:.3g}" if math.isfinite(one.torque) else "",
+            Text(_place(one, one is ranked[0])),
+        )
+    note = "margin: the smallest share left of the limits on contacts, clearance and motors, or of the friction"
+    return Group(Text("Hands from all seeds, best first"), table, Text(note))
 
 
 def audit_summary(found: Audit) -> RenderableType:
@@ -87,6 +110,21 @@ def replay_summary(nominal: Replay, perturbed: Sequence[Replay]) -> RenderableTy
     if perturbed:
         parts.append(Text(f"perturbed: dropped in {len(perturbed) - len(held)} of {len(perturbed)}"))
     return Group(*parts)
+
+
+def _place(one: Alternative, best: bool) -> str:
+    """Where a seed's hand is, or why it is not there."""
+    if one.design.status == "failed":
+        return one.design.reason
+    if one.like is not None:
+        return f"dropped: like that of seed {one.like}"
+    if not one.kept:
+        return "dropped: enough others are better"
+    # Late, because it loads the solver, which other summaries do without.
+    from casadi_hands.alternatives import seed_folder
+
+    place = str(seed_folder(Path(), one.seed))
+    return f"{place}, and here" if best else place
 
 
 def _number(value: float, unit: str) -> tuple[str, str]:

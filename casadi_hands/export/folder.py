@@ -57,6 +57,24 @@ def _write(design: Design, directory: Path) -> None:
     (directory / "result.json").write_text(record_text(design_record(design)), encoding="utf-8")
 
 
+def remove_design(directory: Path) -> None:
+    """Remove a design's files, and the folder if it holds nothing else.
+
+    Args:
+        directory: what `save_design` wrote; need not exist.
+
+    Raises:
+        DesignError: the files cannot be removed.
+    """
+    try:
+        for name in _FILES:
+            (directory / name).unlink(missing_ok=True)
+        if directory.is_dir() and not any(directory.iterdir()):
+            directory.rmdir()
+    except OSError as error:
+        raise DesignError(f"{directory}: cannot remove the design here: {error}") from error
+
+
 def load_design(directory: Path) -> Design:
     """Read a design's folder.
 

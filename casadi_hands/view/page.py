@@ -6,6 +6,8 @@ import json
 import re
 import webbrowser
 from base64 import b64encode
+from collections.abc import Sequence
+from dataclasses import dataclass
 from html import escape
 from importlib.resources import files
 from pathlib import Path
@@ -18,7 +20,20 @@ if TYPE_CHECKING:
     from casadi_hands.design import Design
 
 
-def write_page(design: Design, path: Path, time: float | None = None) -> None:
+@dataclass(frozen=True)
+class MenuEntry:
+    """One line of a page's menu.
+
+    Attributes:
+        text: what it says.
+        address: the page it leads to, relative to the one it is on; None for that page itself.
+    """
+
+    text: str
+    address: str | None
+
+
+def write_page(design: Design, path: Path, time: float | None = None, menu: Sequence[MenuEntry] = ()) -> None:
     """Write the page of a design.
 
     It plays when opened; ``viewer.html#t=1.5`` opens it at 1.5 s, at rest.
@@ -27,6 +42,7 @@ def write_page(design: Design, path: Path, time: float | None = None) -> None:
         design: whole or partial; what does not exist is not shown.
         path: the file to write.
         time: where the page rests when opened without a fragment, s; None to play.
+        menu: pages of other designs to switch to; without any there is no menu.
     """
     scene = draw_scene(design)
     parts = {
@@ -36,6 +52,7 @@ def write_page(design: Design, path: Path, time: float | None = None) -> None:
             f'<li style="--color: rgb({", ".join(str(round(255 * part)) for part in color)})">{escape(name)}</li>'
             for name, color in scene.legend
         ),
+        "menu": _menu(menu),
         "design": _data(scene, time),
         "meshcat": files("meshcat").joinpath("viewer/dist/main.min.js").read_text(encoding="utf-8"),
     }
@@ -71,6 +88,15 @@ def _summary(design: Design, scene: Scene) -> str:
     if scene.longest_force > 0:
         parts.append(f"longest force arrow {scene.longest_force:.3g} N")
     return " · ".join(parts)
+
+
+def _menu(entries: Sequence[MenuEntry]) -> str:
+    """Links, which need no script; the page's own entry is marked."""
+    links = []
+    for entry in entries:
+        where = 'aria-current="page"' if entry.address is None else f'href="{escape(entry.address)}"'
+        links.append(f"<a {where}>{escape(entry.text)}</a>")
+    return f'<nav id="menu" aria-label="designs for this task">{"".join(links)}</nav>' if links else ""
 
 
 def _data(scene: Scene, time: float | None) -> str:

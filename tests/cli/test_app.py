@@ -10,7 +10,6 @@ import time
 import webbrowser
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -70,7 +69,7 @@ def solve_gives(monkeypatch: pytest.MonkeyPatch, outcome: Any) -> list[dict[str,
             raise outcome
         return outcome
 
-    monkeypatch.setattr(casadi_hands, "pipeline", SimpleNamespace(solve=solve), raising=False)
+    monkeypatch.setattr("casadi_hands.pipeline.solve", solve)
     return calls
 
 
@@ -236,9 +235,9 @@ def test_progress_comes_in_lines_at_a_modest_rate(task_file: Path, monkeypatch: 
 
 
 ENDLESS = """
-import sys, types
+import sys
 import casadi as ca
-import casadi_hands
+import casadi_hands.pipeline
 from casadi_hands.cli import main
 
 def solve(task, **settings):
@@ -251,7 +250,7 @@ def solve(task, **settings):
     while True:
         solver(x0=ca.linspace(0, 30, 300))
 
-casadi_hands.pipeline = types.SimpleNamespace(solve=solve)
+casadi_hands.pipeline.solve = solve
 sys.argv = ["casadi-hands", "solve", *sys.argv[1:]]
 main()
 """
