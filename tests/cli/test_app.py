@@ -17,12 +17,14 @@ import pytest
 from typer.testing import CliRunner
 
 import casadi_hands
+from casadi_hands.alternatives import Alternative
 from casadi_hands.cli import main
 from casadi_hands.cli.app import Stage, app
 from casadi_hands.design import Design
 from casadi_hands.export.mjcf import scene_mjcf
 from casadi_hands.task import load_task
 from casadi_hands.verify import Perturbation, Replay
+from tests.alternatives.example import certified, shifted, without_hand
 from tests.export.example import TASK, example_design
 from tests.verify.fixture import Scene, carried
 
@@ -127,7 +129,13 @@ def test_bad_input_is_one_message_and_exit_2(
 
 
 @pytest.mark.parametrize(
-    "arguments", [["solve"], ["solve", "t.yaml", "--until", "never"], ["replay", "d", "--perturb", "-1"]]
+    "arguments",
+    [
+        ["solve"],
+        ["solve", "t.yaml", "--until", "never"],
+        ["solve", "t.yaml", "--seeds", "0"],
+        ["replay", "d", "--perturb", "-1"],
+    ],
 )
 def test_wrong_arguments_exit_2(arguments: list[str]) -> None:
     assert run(*arguments).exit_code == 2
@@ -222,6 +230,56 @@ def test_solve_of_the_first_stage_for_real(tmp_path: Path) -> None:
     at = [float(np.interp(time, motion.time, motion.object_position[:, 1])) for time in (0.0, 1.0, 3.0, 4.0)]
     assert at == pytest.approx([0.0, 0.025, -0.025, 0.0], abs=1e-3)
     assert "casadi-hands view" in found.stdout
+
+
+def test_several_seeds_are_listed_best_first(task_file: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    twin, other = certified(friction_use=0.6, torque=0.25), certified(shifted(0.03), friction_use=0.7)
+    failed = replace(without_hand(), status="failed", reason="no grip at [2 s]")
+    designs = {4: other, 5: certified(torque=0.125), 6: twin, 7: failed}
+    seeds: list[int] = []
+
+    def solve(task: Any, *, seed: int, out: Path, **settings: Any) -> Design:
+        seeds.append(seed)
+        designs[seed].save(out)
+        return designs[seed]
+
+    monkeypatch.setattr("casadi_hands.alternatives.seeds.solve", solve)
+    found = run("solve", task_file, "--seed", 4, "--seeds", 4, "--out", tmp_path / "out")
+    assert (found.exit_code, seeds) == (0, [4, 5, 6, 7])
+    text = " ".join(found.stdout.split())
+    rows = (
+        "5 certified 2+2+2 50 0.125 alternatives/seed5",
+        "6 certified 2+2+2 40 0.25 dropped: like",
+        "4 certified 2+2+2 30 0.1 alternatives/seed4",
+        "7 failed no grip at [2 s]",
+    )
+    places = [text.index(row) for row in rows]
+    assert places == sorted(places)
+    assert Design.load(tmp_path / "out").certificate == designs[5].certificate
+
+
+def test_seeds_begin_with_the_tasks(task_file: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    asked: list[Any] = []
+
+    def explore(task: Any, *, seeds: Any, **settings: Any) -> list[Alternative]:
+        asked.append((list(seeds), settings["jobs"], settings["until"], settings["out"]))
+        return [Alternative(9, replace(example_design(), status="failed"), kept=False)]
+
+    monkeypatch.setattr("casadi_hands.alternatives.explore", explore)
+    task_file.write_text(TASK + "search: {seed: 9}\n")
+    found = run("solve", task_file, "--seeds", 3, "--jobs", 2, "--until", "whole_hand", "--out", tmp_path)
+    assert asked == [([9, 10, 11], 2, "whole_hand", tmp_path)]
+    assert found.exit_code == 1
+
+
+def test_one_seed_leaves_no_alternatives_of_an_earlier_solve(
+    task_file: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    example_design().save(tmp_path / "alternatives" / "seed3")
+    solve_gives(monkeypatch, example_design())
+    found = run("solve", task_file, "--out", tmp_path)
+    assert not (tmp_path / "alternatives").exists()
+    assert "Hands from all seeds" not in found.stdout
 
 
 def test_progress_comes_in_lines_at_a_modest_rate(task_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:

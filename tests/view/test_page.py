@@ -4,6 +4,7 @@ import json
 import re
 from base64 import b64decode
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
@@ -14,7 +15,7 @@ from casadi_hands.design import Design
 from casadi_hands.errors import DesignError
 from casadi_hands.export.urdf import hand_urdf
 from casadi_hands.task import parse_task
-from casadi_hands.view.page import open_page, write_page
+from casadi_hands.view.page import MenuEntry, open_page, write_page
 from tests.export.example import TASK, example_design, example_hand, example_motion, example_task
 
 
@@ -143,6 +144,18 @@ def test_the_page_needs_no_network(page):
     assert "viewer.connect" not in text
     assert not re.search(r"<(?:script|img|link|iframe)[^>]*\b(?:src|href)=", text)
     assert len(text) < 3e6
+
+
+def test_a_menu_links_to_other_pages_and_marks_its_own(page, tmp_path):
+    entries = [MenuEntry("seed 1 <best>", None), MenuEntry('seed "2"', 'alternatives/a&b"c/viewer.html')]
+    write_page(example_design(), tmp_path / "viewer.html", menu=entries)
+    text = (tmp_path / "viewer.html").read_text()
+    links = re.search(r'<nav id="menu".*?</nav>', text)[0]
+    own, other = ElementTree.fromstring(links)
+    assert (own.text, own.attrib) == ("seed 1 <best>", {"aria-current": "page"})
+    assert (other.text, other.attrib) == ('seed "2"', {"href": 'alternatives/a&b"c/viewer.html'})
+    # Nothing else is changed, and without entries there is no menu.
+    assert text.replace(links, "") == page.read_text()
 
 
 def test_equal_designs_give_equal_pages(page, tmp_path):
