@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from scipy.interpolate import CubicHermiteSpline
+from scipy.interpolate import BPoly, CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.nlp import Solution, Solver
@@ -51,6 +51,7 @@ perturbations:
   - {{from: 0.5, to: 0.7, force: [0, {0.2 * s}, 0]}}
 hand: {{link_radius: {0.006 * s}, link_length: [{0.012 * s}, {0.1 * s}], joint_limits: [-80, 85]}}
 actuator: {{torque: {0.05 * s * s}, speed: 6}}
+limits: {{goal_position: {0.0005 * s}}}
 keyframes_between: 1
 """
 
@@ -149,6 +150,11 @@ def spline_at(knots: Array, values: Array, times: Array) -> Array:
 
 def linear_at(knots: Array, values: Array, times: Array) -> Array:
     return np.column_stack([np.interp(times, knots, column) for column in values.T])
+
+
+def resting_at(knots: Array, values: Array, times: Array) -> Array:
+    """The straight way through values (K, d) with no speed and no acceleration at any of them: SciPy's quintic."""
+    return np.asarray(BPoly.from_derivatives(knots, [[value, 0 * value, 0 * value] for value in values])(times))
 
 
 def g(x: Array) -> Array:

@@ -9,7 +9,7 @@ import pytest
 
 from casadi_hands.stages.floating import FloatingStage
 from casadi_hands.stages.model import Model, build_model
-from casadi_hands.stages.object_side import object_parameters, pose_bounds, straight_path, term_weights
+from casadi_hands.stages.object_side import object_parameters, pose_bounds, straight_path, term_weights, tool_path
 from casadi_hands.task import Task, parse_task
 from tests.stages.example import (
     Motion,
@@ -24,6 +24,7 @@ from tests.stages.example import (
     made_up_values,
     palm_apart,
     project,
+    resting_at,
     spline_at,
 )
 from tests.stages.test_model import rotations
@@ -83,19 +84,26 @@ class Witness:
         }
 
     def straight(self) -> Array:
-        """Goals joined by straight lines; a drawing's object upright."""
-        model = self.model
-        positions = model.goal_positions - (0 if model.tool is None else model.tool)
+        """Goals joined by straight lines; a drawing's object upright, and at rest at every goal."""
+        model, times = self.model, self.schedule.keyframes
+        goal_times = times[list(self.schedule.goals)]
+        if model.tool is None:
+            return linear_at(goal_times, np.hstack([model.goal_positions, model.goal_vectors]), times)
+        positions = resting_at(goal_times, model.goal_positions - model.tool, times)
+        return np.hstack([positions, np.zeros_like(positions)])
+
+    def drawn(self) -> Array:
+        """Where a drawing's tool must be at the samples."""
         goal_times = self.schedule.keyframes[list(self.schedule.goals)]
-        return linear_at(goal_times, np.hstack([positions, model.goal_vectors]), self.schedule.keyframes)
+        return resting_at(goal_times, self.model.goal_positions, self.schedule.samples)
 
     def task(self) -> float:
         model = self.model
         positions, orientations = self.motion.at(0)
         goal_times = self.schedule.keyframes[list(self.schedule.goals)]
         if model.tool is not None:
-            drawn = np.array([p + r.apply(model.tool) for p, r in zip(positions, orientations, strict=True)])
-            return float(((drawn - linear_at(goal_times, model.goal_positions, self.schedule.samples)) ** 2).sum())
+            tool = np.array([p + r.apply(model.tool) for p, r in zip(positions, orientations, strict=True)])
+            return float(((tool - self.drawn()) ** 2).sum())
         total, reference = 0.0, rotations(model.reference)
         for time, position, vector in zip(goal_times, model.goal_positions, model.goal_vectors, strict=True):
             sample = int(np.argmin(np.abs(self.schedule.samples - time)))
@@ -345,3 +353,4 @@ def test_straight_path_joins_the_goals(full: Case, drawn: Case) -> None:
     for case in (full, drawn):
         witness = Witness(case.model, case.values)
         np.testing.assert_allclose(straight_path(case.model), witness.straight(), atol=1e-12)
+    np.testing.assert_allclose(tool_path(drawn.model), Witness(drawn.model, drawn.values).drawn(), atol=1e-12)

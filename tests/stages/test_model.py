@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import json
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from tests.stages.example import drawing, everything, everything_text
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 LENGTHS = {"start", "end", "center", "radius", "position", "touches", "gravity"}
+LIMITS = ("goal_position", "gap", "gap_between", "slip", "penetration")  # those in metres
 
 
 def rotations(quaternions: np.ndarray) -> Rotation:
@@ -107,6 +109,25 @@ def test_palm_moves_between_its_waypoints_and_then_stands() -> None:
     assert (rotations(model.palm_quaternion) * slerp(times).inv()).magnitude().max() < 1e-7
 
 
+def test_goals_are_missed_by_no_more_than_the_task_allows() -> None:
+    # Of 0.8 mm and 0.3 degrees nine tenths, in whatever direction the three coordinates are off together.
+    text = everything_text().replace(
+        "limits: {goal_position: 0.0005}", "limits: {goal_position: 0.0008, goal_angle: 0.3}"
+    )
+    task = parse_task(text)
+    model = build_model(task)
+    position, angle = model.goal_tolerance
+    assert position * 0.0475 == pytest.approx(0.9 * 0.0008 / 3**0.5, rel=1e-9)
+    assert np.degrees(angle) == pytest.approx(0.9 * 0.3 / 3**0.5, rel=1e-9)
+    goals = [Rotation.from_rotvec(goal.rotation.vector) for goal in task.motion]
+    for corner in itertools.product((-1, 1), repeat=3):
+        assert np.linalg.norm(corner) * position * 0.0475 == pytest.approx(0.9 * 0.0008)
+        for goal, vector in zip(goals, model.goal_vectors, strict=True):
+            missed = Rotation.from_rotvec(vector + angle * np.array(corner)) * rotations(model.reference)
+            # Coordinates of turns that are not small turn by less than they change.
+            assert 0.7 * 0.27 < np.degrees((missed * goal.inv()).magnitude()) < 0.27 * (1 + 1e-6)
+
+
 def test_perturbations_act_in_their_time_and_add_up() -> None:
     _, model = everything()
     weight = 0.2 * 9.81
@@ -152,13 +173,15 @@ def scaled(node: object, factor: float, key: str = "") -> object:
 
 
 def ten_times_larger(name: str) -> Model:
+    task = parse_task((PROBLEMS / name).read_text())
     data = YAML(typ="safe").load(PROBLEMS / name)
     data.setdefault("gravity", [0, 0, -9.81])
+    data["limits"] = {**data.get("limits", {}), **{name: 10 * getattr(task.limits, name) for name in LIMITS}}
     return build_model(parse_task(json.dumps(scaled(data, 10.0))))
 
 
 def test_lengths_and_gravity_ten_times_larger_give_the_same_model() -> None:
-    # Forces of perturbations grow with gravity, torques with gravity and length.
+    # Forces of perturbations grow with gravity, torques with gravity and length; limits in metres with length.
     check_same_but_for_units(everything()[1], build_model(parse_task(everything_text(10.0))))
 
 
