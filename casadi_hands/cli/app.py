@@ -76,8 +76,8 @@ def solve(
         typer.Option(
             min=1,
             metavar="N",
-            help="Solve from N seeds, SEED and those that follow it; DIR holds the best hand and, in alternatives/, "
-            "up to four distinct ones.",
+            help="Solve from N seeds, this one and those that follow it: the folder then holds the best hand and, in "
+            "alternatives/, up to four distinct ones.",
         ),
     ] = 1,
     jobs: Jobs = None,
