@@ -76,7 +76,7 @@ def solve(
         typer.Option(
             min=1,
             metavar="N",
-            help="Solve from N seeds, this one and those that follow it: the folder then holds the best hand and, in "
+            help="Solve from N seeds, --seed and those that follow it: the folder then holds the best hand and, in "
             "alternatives/, up to four distinct ones.",
         ),
     ] = 1,
