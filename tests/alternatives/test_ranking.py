@@ -39,8 +39,8 @@ def test_equals_keep_the_order_of_their_seeds() -> None:
 
 
 def test_near_duplicates_of_a_better_hand_are_dropped() -> None:
-    # Half the object's extent is 0.06 m, so hands 0.011 m apart are alike, and 0.013 m apart are not.
-    ranked = rank({0: certified(), 1: certified(shifted(0.011)), 2: certified(shifted(0.013)), 3: certified()})
+    # Half the object's extent is 0.06 m, so hands 0.017 m apart are alike, and 0.019 m apart are not.
+    ranked = rank({0: certified(), 1: certified(shifted(0.017)), 2: certified(shifted(0.019)), 3: certified()})
     assert [(one.seed, one.kept, one.like) for one in ranked] == [
         (0, True, None),
         (1, False, 0),
