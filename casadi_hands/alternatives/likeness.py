@@ -9,7 +9,7 @@ import numpy as np
 from casadi_hands.design import Finger, Hand
 
 ALIKE = 0.3
-"""Hands that differ by less are near-duplicates: 0.3 of half the object's extent, 17 degrees; hardly seen on the page."""
+"""Hands that differ by less are near-duplicates: 0.3 of half the object's extent, or 17 degrees, hardly show."""
 
 
 def difference(first: Hand, second: Hand, length: float) -> float:
