@@ -1,0 +1,100 @@
+"""A made-up hand and motion for the refine stage, which no equation holds for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from casadi_hands.stages.model import Model
+from casadi_hands.stages.refine import Margin, RefineStage
+from casadi_hands.stages.whole_hand import WholeHand
+from tests.stages.example import made_up_finger, made_up_solution, project
+
+Array = np.ndarray
+
+
+class MadeUp:
+    """A stage for fingers of one and two joints, a motion out of order, and values away from where it starts.
+
+    Args:
+        model: of a task.
+        contacts: of the two fingers.
+        lifted: for a contact, the ground's the last, from which sample to which it does not touch.
+    """
+
+    def __init__(self, model: Model, contacts: tuple[int, int], lifted: Mapping[int, tuple[int, int]]) -> None:
+        self.model, rng = model, np.random.default_rng(0)
+        count = len(model.schedule.samples)
+        patches, capsules = model.patches, model.capsules
+        if model.ground is not None:
+            patches, capsules = np.vstack([patches, model.ground.patch]), np.vstack([capsules, model.ground.capsule])
+        self.active = np.ones((count, len(patches)), bool)
+        for contact, (first, last) in lifted.items():
+            self.active[first:last, contact] = False
+        self.start = WholeHand(
+            fingers=tuple(made_up_finger(model, n, 2, seed=n) for n in (1, 2)),
+            contacts=contacts,
+            pose=np.zeros((len(model.schedule.keyframes), 6)),
+            angles=tuple(rng.uniform(-0.8, 0.8, (count, n)) for n in (1, 2)),
+            palm_position=model.palm_position,
+            palm_quaternion=model.palm_quaternion,
+            position=rng.uniform(-0.5, 0.9, (count, 3)),
+            vector=rng.uniform(-1, 1, (count, 3)),
+            point=patches + 0.3 * capsules[:, 6:] * rng.normal(size=(count, len(patches), 3)),
+            force=rng.normal(size=(count, len(patches), 3)),
+            active=self.active,
+            solution=made_up_solution({}),
+        )
+        self.stage = RefineStage(model, contacts, (1, 2), self.active)
+        self.values = {
+            name: value + 0.05 * rng.normal(size=np.shape(value))
+            for name, value in self.stage._start(self.start).items()
+        }
+        # Contacts near their surfaces that press, in no balance; torques that do not whirl a thin object round.
+        chosen = self.stage.structure.columns
+        inward = np.array([-project(point, capsule)[1] for point, capsule in zip(patches, capsules, strict=True)])
+        off = 0.1 * capsules[chosen, 6:] * rng.normal(size=(count, len(chosen), 3))
+        self.values["point"] = (self.start.point[:, chosen] + off).reshape(count, -1)
+        pressing = inward[chosen] + 0.2 * rng.normal(size=(count, len(chosen), 3))
+        self.values["force"] = pressing.reshape(count, -1)
+        for name in ("wrench", "middle_torque"):
+            self.values[name] = 1e-4 * self.values[name]
+
+    @property
+    def touching(self) -> Array:
+        """Flags (S, columns) of the contacts in use: held from each knot to the next, the first broken one too."""
+        flags = self.active[:, self.stage.structure.columns]
+        return np.array(
+            [[flags[k, c] or (k > 0 and flags[k - 1, c]) for c in range(flags.shape[1])] for k in range(len(flags))]
+        )
+
+    def parameters(self, weights: Mapping[str, float], margin: Margin | None = None) -> dict[str, object]:
+        given = self.stage._parameters(self.start, margin or Margin())
+        terms = self.stage.problem.terms
+        return {**given, **{f"weight.{name}": weight for name, weight in weights.items() if name in terms}}
+
+    def constraints(self, weights: Mapping[str, float]) -> dict[str, Array]:
+        """``kernel.constraint`` -> its values at ``values``, one row an instance."""
+        problem = self.stage.problem
+        x = problem.variables.pack(self.values, np.zeros(problem.variables.size))
+        p = problem.parameters.pack(self.parameters(weights), np.zeros(problem.parameters.size))  # type: ignore[arg-type]
+        g = np.asarray(self.stage.solver.functions["nlp"](x, p)[1]).ravel()
+        return {name: g[rows] for name, rows in problem.constraint_rows.items()}
+
+    @property
+    def turns(self) -> list[Rotation]:
+        """The object's orientations, by SciPy."""
+        reference = Rotation.from_quat(self.model.reference, scalar_first=True)
+        return [Rotation.from_rotvec(v) * reference for v in self.values["pose"][:, 3:]]
+
+    @property
+    def points(self) -> Array:
+        """(S, columns, 3) object frame."""
+        return self.values["point"].reshape(len(self.active), -1, 3)
+
+    @property
+    def forces(self) -> Array:
+        """(S, columns, 3) object frame."""
+        return self.values["force"].reshape(len(self.active), -1, 3)
