@@ -19,6 +19,8 @@ from casadi_hands.task import Task
 Array = NDArray[np.float64]
 STANDARD_GRAVITY = 9.81  # m/s², sets the force unit where a task has none
 _WITHIN = 0.9 / math.sqrt(3)  # share of a limit that each of three coordinates may use
+# Half extents. Beyond these a gap is no contact, and slip would need friction on its cone, whatever a task accepts.
+_MOST_GAP, _MOST_SLIP = 2e-4, 4e-3
 _DIGITS = 12  # significant digits kept, so that scaled tasks give the very same numbers
 
 
@@ -78,6 +80,8 @@ class Model:
         goal_positions: (G, 3) world; for a drawing the tool's targets.
         goal_vectors: (G, 3) rotation vectors from the reference orientation, world; zeros for a drawing.
         goal_tolerance: half extents and rad, what each coordinate may miss a goal by within the task's limits.
+        gap_tolerance: half extents, a part of the task's limit that a contact's surfaces may be apart.
+        slip_tolerance: half extents, a part of the task's limit that a contact may slip from touch to lift.
         reference: (4,) quaternion of the reference orientation.
         tool: (3,) object frame, or None when goals are poses.
         perturbation_force: (S, 3) m·g, world.
@@ -105,6 +109,8 @@ class Model:
     goal_positions: Array
     goal_vectors: Array
     goal_tolerance: tuple[float, float]
+    gap_tolerance: float
+    slip_tolerance: float
     reference: Array
     tool: Array | None
     perturbation_force: Array
@@ -180,6 +186,8 @@ def build_model(task: Task) -> Model:
             round_off(_WITHIN * task.limits.goal_position / length),
             _WITHIN * math.radians(task.limits.goal_angle),
         ),
+        gap_tolerance=round_off(min(0.2 * task.limits.gap / length, _MOST_GAP)),
+        slip_tolerance=round_off(min(0.4 * task.limits.slip / length, _MOST_SLIP)),
         reference=reference,
         tool=None if not task.draws else round_off(np.asarray(task.tool) / length),
         perturbation_force=round_off(forces / units.force),

@@ -66,6 +66,7 @@ WEIGHTS = {
     "force_regularisation": 1e-3,
 }
 FIRM = {"slip": 100.0, "passive_force": 30.0}
+EXACT = {"slip": 100.0}  # its tolerance is there for where it is needed
 
 
 @dataclass(frozen=True)
@@ -111,13 +112,13 @@ class RefineStage:
         margin = margin or Margin()
         values, parameters = self._start(start), self._parameters(start, margin)
         lower, upper = self._bounds()
-        always, roll, supply = self._constraint_bounds(margin)
+        always, exact = self._constraint_bounds(margin)
         runs: list[tuple[str, Solution]] = []
         slips: dict[str, float] = {}
         for what, weights, hard, options in (
             ("soft", WEIGHTS, Bounds(), SOFT),
             ("firm", WEIGHTS | FIRM, Bounds(), CLOSER),
-            ("exact", WEIGHTS, roll | supply, HARD),
+            ("exact", WEIGHTS | EXACT, exact, HARD),
         ):
             if what == "exact" and max(slips.values()) > AFAR:
                 options = HARD_FROM_AFAR
@@ -133,24 +134,33 @@ class RefineStage:
                     break
         return self._result(start, runs, slips)
 
-    def _constraint_bounds(self, margin: Margin) -> tuple[Bounds, Bounds, Bounds]:
-        """Bounds of constraints: those that hold in every solve, those that forbid slip, and passive forces."""
+    def _constraint_bounds(self, margin: Margin) -> tuple[Bounds, Bounds]:
+        """Bounds of constraints: those that hold in every solve, and those of the exact one.
+
+        Contact and rolling are met within a small part of the task's limits. Where joints have one freedom less than
+        the motion needs, or a motion in a plane meets some of them twice, equations would have no solver's solution.
+        """
         structure, model = self.structure, self.model
         always: Bounds = {}
-        rows = self.problem.constraint_rows
+        exact: Bounds = {}
         for i, c in enumerate(self.contacts):
             active = structure.active[structure.touching[:, i], i]
             always[f"contact{c}.pressing"] = (np.where(active, margin.normal_force, 0.0)[:, None], np.inf)
+            for name in ("on_object", "on_link"):
+                exact[f"contact{c}.{name}"] = (-model.gap_tolerance, model.gap_tolerance)
+            slip = model.slip_tolerance / (np.sqrt(2) * longest_run(structure.active[:, i]))
+            exact[f"rolling{c}.no_slip"] = (-slip, slip)
+            for kernel in ("contact", "held"):
+                if f"{kernel}{c}.passive" in self.problem.constraint_rows:
+                    exact[f"{kernel}{c}.passive"] = (-margin.passive, margin.passive)
+        if structure.grounded:
+            slip = model.slip_tolerance / (np.sqrt(2) * longest_run(structure.active[:, -1]))
+            exact["ground_rolling.no_slip"] = (-slip, slip)
         if model.tool is not None:
             tolerance = np.full((self.knots, 3), TOOL_TOLERANCE)
             tolerance[model.schedule.keyframe_samples[list(model.schedule.goals)]] = model.goal_tolerance[0]
             always["tool_point.on_path"] = (-tolerance, tolerance)
-        roll: Bounds = {f"rolling{c}.no_slip": (0.0, 0.0) for c in self.contacts}
-        if structure.grounded:
-            roll["ground_rolling.no_slip"] = (0.0, 0.0)
-        names = [f"{kernel}{c}.passive" for c in self.contacts for kernel in ("contact", "held")]
-        supply: Bounds = {name: (-margin.passive, margin.passive) for name in names if name in rows}
-        return always, roll, supply
+        return always, exact
 
     def _slips(self, solution: Solution) -> dict[str, float]:
         """Path length of each finger contact's slip."""
@@ -273,6 +283,12 @@ class RefineStage:
         worst = max(solution.violations.items(), key=lambda item: item[1])
         exact = runs[-1][0] == "exact" and worst[1] <= ACCEPTED
         return Refined(hand, exact, worst, slips, moved, tuple(runs))
+
+
+def longest_run(flags: NDArray[np.bool_]) -> int:
+    """Length of the longest stretch of set flags (S,); 1 where none is set."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
+    return max(1, int((edges[1::2] - edges[::2]).max(initial=1)))
 
 
 def _helpers(points: Array, capsule: Array) -> Array:
