@@ -111,9 +111,7 @@ def test_palm_moves_between_its_waypoints_and_then_stands() -> None:
 
 def test_goals_are_missed_by_no_more_than_the_task_allows() -> None:
     # Of 0.8 mm and 0.3 degrees nine tenths, in whatever direction the three coordinates are off together.
-    text = everything_text().replace(
-        "limits: {goal_position: 0.0005}", "limits: {goal_position: 0.0008, goal_angle: 0.3}"
-    )
+    text = everything_text().replace("goal_position: 0.0005", "goal_position: 0.0008, goal_angle: 0.3")
     task = parse_task(text)
     model = build_model(task)
     position, angle = model.goal_tolerance

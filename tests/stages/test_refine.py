@@ -77,7 +77,7 @@ def test_goals_are_bounds_as_wide_as_the_task_allows(made_up: MadeUp) -> None:
 def test_a_drawing_s_goals_bound_its_tool_and_not_its_pose(drawn: MadeUp) -> None:
     lower, upper = drawn.stage._bounds()
     assert (upper["pose"] - lower["pose"] > 10).all()
-    always, _, _ = drawn.stage._constraint_bounds(Margin())
+    always = drawn.stage._constraint_bounds(Margin())[0]
     low, high = (np.asarray(bound) for bound in always["tool_point.on_path"])
     np.testing.assert_array_equal(low, -high)
     at = np.isin(np.round(drawn.model.schedule.samples, 9), [0, 0.7, 1.5])
@@ -86,16 +86,47 @@ def test_a_drawing_s_goals_bound_its_tool_and_not_its_pose(drawn: MadeUp) -> Non
     np.testing.assert_array_equal(high[~at], TOOL_TOLERANCE)
 
 
-def test_margins_are_bounds_of_active_contacts_and_rolling_comes_last(made_up: MadeUp) -> None:
-    always, roll, supply = made_up.stage._constraint_bounds(Margin(normal_force=0.7, passive=0.02))
-    active, touching = made_up.start.active[:, 2], made_up.touching[:, 1]
+def test_margins_are_bounds_of_contacts_while_they_are_active(made_up: MadeUp) -> None:
+    always, *others = made_up.stage._constraint_bounds(Margin(normal_force=0.7, passive=0.02))
+    active, touching = made_up.active[:, 2], made_up.touching[:, 1]
     low, high = always["contact2.pressing"]
     np.testing.assert_array_equal(np.ravel(low), np.where(active, 0.7, 0.0)[touching])
     assert high == np.inf
-    assert roll == {name: (0.0, 0.0) for name in ("rolling0.no_slip", "rolling2.no_slip", "ground_rolling.no_slip")}
-    assert supply == {f"{kernel}{c}.passive": (-0.02, 0.02) for kernel in ("contact", "held") for c in (0, 2)}
+    exact = {name: bounds for part in others for name, bounds in part.items()}
+    for c in (0, 2):
+        for kernel in ("contact", "held"):
+            assert exact[f"{kernel}{c}.passive"] == (-0.02, 0.02)
     # None of them is the name of nothing.
-    assert {*always, *roll, *supply} <= set(made_up.stage.problem.constraint_rows)
+    assert {*always, *exact} <= set(made_up.stage.problem.constraint_rows)
+
+
+def test_steps_without_slip_add_up_to_less_than_the_task_allows(made_up: MadeUp) -> None:
+    always, *others = made_up.stage._constraint_bounds(Margin())
+    exact = {name: bounds for part in others for name, bounds in part.items()}
+    allowed = 0.0002 / 0.0475
+    for name, contact in (("rolling0", 0), ("rolling2", 2), ("ground_rolling", 3)):
+        assert f"{name}.no_slip" not in always
+        farthest = np.linalg.norm(np.broadcast_to(np.abs(exact[f"{name}.no_slip"]).max(axis=0), 2))
+        together = longest = 0.0
+        for flag in made_up.active[:-1, contact]:
+            together = together + farthest if flag else 0.0
+            longest = max(longest, together)
+        assert longest <= 0.9 * allowed
+
+
+def test_surfaces_touch_within_what_the_task_allows(made_up: MadeUp) -> None:
+    always, *others = made_up.stage._constraint_bounds(Margin())
+    problem = made_up.stage.problem
+    low, high = problem.constraint_lower.copy(), problem.constraint_upper.copy()
+    for part in (always, *others):
+        for name, bounds in part.items():
+            low[problem.constraint_rows[name]], high[problem.constraint_rows[name]] = bounds
+    for c in (0, 2):
+        apart = sum(
+            np.linalg.norm(np.maximum(np.abs(low[rows]), np.abs(high[rows])), axis=1).max()
+            for rows in (problem.constraint_rows[f"contact{c}.{name}"] for name in ("on_object", "on_link"))
+        )
+        assert apart <= 0.00005 / 0.0475
 
 
 def test_friction_keeps_its_margin_on_fingers_and_ground(made_up: MadeUp) -> None:
