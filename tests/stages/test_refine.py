@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from casadi_hands.stages.refine import (
     Margin,
     Refined,
     RefineStage,
+    longest_run,
 )
 from casadi_hands.stages.target import target_of
 from casadi_hands.stages.whole_hand import WholeHand, WholeHandStage
@@ -98,6 +100,13 @@ def test_margins_are_bounds_of_contacts_while_they_are_active(made_up: MadeUp) -
             assert exact[f"{kernel}{c}.passive"] == (-0.02, 0.02)
     # None of them is the name of nothing.
     assert {*always, *exact} <= set(made_up.stage.problem.constraint_rows)
+
+
+def test_the_longest_run_is_that_of_a_count() -> None:
+    rng = np.random.default_rng(0)
+    for flags in (*(rng.random((50, 12)) < 0.7), np.ones(5, bool), np.zeros(5, bool)):
+        runs = [len(list(run)) for flag, run in itertools.groupby(flags.tolist()) if flag]
+        assert longest_run(flags) == max([*runs, 1])
 
 
 def test_steps_without_slip_add_up_to_less_than_the_task_allows(made_up: MadeUp) -> None:
@@ -224,6 +233,16 @@ def test_the_result_is_exact_and_the_audit_certifies_it(solved: Solved) -> None:
     assert solved.verdict.reasons == []
     assert solved.verdict.certified
     assert [what for what, _ in solved.refined.runs] == ["soft", "firm", "exact"]
+
+
+def test_the_files_have_the_points_and_forces_that_balance(solved: Solved) -> None:
+    # A point moved onto the surface by a gap of 1e-5 lengths is another lever: a torque that nothing exerts.
+    motion, hand, units = solved.design.motion, solved.refined.hand, solved.model.units
+    assert motion is not None
+    np.testing.assert_allclose(motion.contact_point_object, hand.point * units.length, atol=1e-7 * units.length)
+    for k, vector in enumerate(hand.vector):
+        turn = Rotation.from_rotvec(vector) * Rotation.from_quat(solved.model.reference, scalar_first=True)
+        np.testing.assert_allclose(motion.contact_force[k], turn.apply(hand.force[k]) * units.force, atol=1e-9)
 
 
 def test_the_margins_are_kept(solved: Solved) -> None:
