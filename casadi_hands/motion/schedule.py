@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from casadi_hands.motion.spline import catmull_rom, held, linear
 
@@ -57,9 +57,9 @@ class Schedule:
         """Index (S,) of the keyframe whose contact flags hold at each sample."""
         return held(self.keyframes, self.samples)
 
-    def spline(self, offset: float = 0.0) -> Weights:
-        """Catmull–Rom weights (S, N) at the samples, ``offset`` steps later."""
-        return catmull_rom(self.keyframes, self.samples + offset * self.step)
+    def spline(self, offset: float = 0.0, resting: ArrayLike = ()) -> Weights:
+        """Catmull–Rom weights (S, N) at the samples, ``offset`` steps later, at rest at the keyframes ``resting``."""
+        return catmull_rom(self.keyframes, self.samples + offset * self.step, resting)
 
     def linear(self, offset: float = 0.0) -> Weights:
         """Linear weights (S, N) at the samples, ``offset`` steps later."""

@@ -32,10 +32,11 @@ def held(knots: ArrayLike, times: ArrayLike) -> NDArray[np.int64]:
     return np.clip(np.searchsorted(knots, np.asarray(times, float) + 1e-9, side="right") - 1, 0, len(knots) - 1)
 
 
-def catmull_rom(knots: ArrayLike, times: ArrayLike) -> Weights:
+def catmull_rom(knots: ArrayLike, times: ArrayLike, resting: ArrayLike = ()) -> Weights:
     """Weights (T, N) of a Catmull–Rom spline whose end points are mirrored, so that it starts and ends at rest.
 
-    The tangent at an inner knot is the slope between its neighbours. Times before the first knot and after the
+    The tangent at an inner knot is the slope between its neighbours, or zero at the knots whose indices are given as
+    ``resting``. Times before the first knot and after the
     last see the motion's mirror image, which keeps central differences at the ends consistent.
     """
     at = np.asarray(knots, float)
@@ -44,7 +45,7 @@ def catmull_rom(knots: ArrayLike, times: ArrayLike) -> Weights:
     index, s = _segment(at, when)
     count, rows = len(at), np.arange(len(when))
     tangents = np.zeros((count, count))
-    for i in range(1, count - 1):
+    for i in set(range(1, count - 1)) - set(np.asarray(resting, int).tolist()):
         slope = 1 / (at[i + 1] - at[i - 1])
         tangents[i, i + 1], tangents[i, i - 1] = slope, -slope
     span = (at[index + 1] - at[index])[:, None]

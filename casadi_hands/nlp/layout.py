@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -95,6 +95,17 @@ class Rows:
         """Entries ``start`` to ``stop`` of every row."""
         rows = (np.arange(self.count)[:, None] * self.width + np.arange(start, stop)).reshape(-1)
         return Rows(self.matrix[rows], self.count)
+
+    @classmethod
+    def beside(cls, parts: Sequence[Rows]) -> Rows:
+        """Rows whose entries are those of all parts, one after the other; all have the same count."""
+        count, starts = parts[0].count, np.cumsum([0, *[part.matrix.shape[0] for part in parts]])
+        rows = [
+            start + np.arange(len(p.matrix.indptr) - 1).reshape(count, -1)
+            for start, p in zip(starts, parts, strict=False)
+        ]
+        stacked = sparse.csr_array(sparse.vstack([part.matrix for part in parts], format="csr"))
+        return cls(stacked[np.hstack(rows).reshape(-1)], count)
 
     def constant(self, count: int) -> Rows:
         """One row repeated for ``count`` instances."""

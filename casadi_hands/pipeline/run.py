@@ -58,6 +58,7 @@ def _run(record: Record, until: str, executor: Executor | None, jobs: int) -> De
     """All stages, to the last one asked for."""
     model = build_model(record.task)
     floating = run_floating(record, model)
+    model = floating.model
     if until == "floating":
         return _stopped(record.design, until)
     search = prepare_search(record, model, floating, executor)

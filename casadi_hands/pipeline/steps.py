@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from casadi_hands.pipeline.record import Record
 from casadi_hands.search.algorithm import Candidate, Found, Search, run_record
-from casadi_hands.stages.floating import Floating, FloatingStage
+from casadi_hands.stages.floating import Floating, solve_floating
 from casadi_hands.stages.model import Model
 from casadi_hands.stages.outcome import floating_motion, hand_of, joint_loads, whole_hand_motion
 from casadi_hands.stages.target import target_of
@@ -19,10 +19,10 @@ def run_floating(record: Record, model: Model) -> Floating:
     """Stage 1."""
     task = record.task
     with record.stage("floating", f"object's motion with {model.contacts} floating contacts"):
-        result = FloatingStage(model).solve(dict(task.weights.floating))
+        result = solve_floating(model, dict(task.weights.floating))
     record.add_runs([run_record("floating", what, task.search.seed, what, s) for what, s in result.runs])
     record.set_costs("floating", result.solution, dict(task.weights.floating))
-    record.update(motion=floating_motion(model, result))
+    record.update(motion=floating_motion(result.model, result))
     record.keep(replace(record.design, reason="stopped before a hand was designed"))
     return result
 

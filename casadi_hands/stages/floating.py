@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -21,6 +21,7 @@ from casadi_hands.stages.object_side import (
     straight_path,
     term_weights,
 )
+from casadi_hands.stages.regrasp import planned_regrasp
 
 Array = NDArray[np.float64]
 THRESHOLDS = (0.1, 0.2, 0.3)
@@ -40,6 +41,7 @@ class Floating:
         threshold: that gave ``active``; 0 where all contacts had to stay.
         solution: the solve this motion is from.
         runs: every solve: (what, solution).
+        model: it was solved with; it plans a regrasp where one is needed.
     """
 
     pose: Array
@@ -50,6 +52,17 @@ class Floating:
     threshold: float
     solution: Solution
     runs: tuple[tuple[str, Solution], ...]
+    model: Model
+
+
+def solve_floating(model: Model, weights: Mapping[str, float]) -> Floating:
+    """Stage 1, with a regrasp where contacts would travel too far around the object and others can hold it."""
+    floating = FloatingStage(model).solve(weights)
+    plan = planned_regrasp(model, floating.pose)
+    if plan is None:
+        return floating
+    planned = replace(model, regrasp=plan)
+    return FloatingStage(planned).solve_regrasp(floating, weights) or floating
 
 
 class FloatingStage:
@@ -68,13 +81,12 @@ class FloatingStage:
         model, schedule = self.model, self.model.schedule
         keyframes, samples, contacts = sizes(model)
         pose = straight_path(model)
-        patches = model.patches if model.ground is None else np.vstack([model.patches, model.ground.patch])
         turned = (linear(schedule.keyframes, schedule.samples) @ pose)[:, 3:]
         reference = pin.Quaternion(*model.reference).matrix()
         force = np.array([least_squares_forces(model, pin.exp3(v) @ reference) for v in turned])
         start = {
             "pose": pose,
-            "point": np.tile(patches.reshape(1, -1), (keyframes, 1)),
+            "point": model.keyframe_patches.reshape(keyframes, -1),
             "force": force.reshape(samples, -1),
             "activity": np.full((keyframes, contacts), 0.9),
         }
@@ -112,6 +124,29 @@ class FloatingStage:
             threshold=threshold,
             solution=chosen,
             runs=tuple(runs),
+            model=self.model,
+        )
+
+    def solve_regrasp(self, before: Floating, weights: Mapping[str, float]) -> Floating | None:
+        """Solve again with the model's planned regrasp, from the motion without it; None where it fails the gate."""
+        assert self.model.regrasp is not None
+        parameters = object_parameters(self.model) | term_weights(self.solver.problem, self.model, weights)
+        keyframes, contacts = len(before.pose), sizes(self.model)[2]
+        start = {**before.solution.values, "point": self.model.keyframe_patches.reshape(keyframes, -1)}
+        flags = (before.active & ~self.model.regrasp.lifted).astype(float)
+        fixed = {"activity": flags}
+        solution = self.solver.solve({**start, **fixed}, parameters, OPTIONS, lower=fixed, upper=fixed)
+        if not passes_gate(self.model, solution.values, pivots=True):
+            return None
+        return replace(
+            before,
+            pose=solution.values["pose"],
+            point=solution.values["point"].reshape(-1, contacts, 3),
+            force=solution.values["force"].reshape(-1, contacts, 3),
+            active=flags > 0.5,
+            solution=solution,
+            runs=(*before.runs, ("regrasp", solution)),
+            model=self.model,
         )
 
     def _candidates(self, activity: Array) -> list[tuple[Array, float]]:

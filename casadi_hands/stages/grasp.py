@@ -14,6 +14,7 @@ from casadi_hands.stages.model import Model
 Array = NDArray[np.float64]
 _PRELOAD = 1.0  # m·g, normal force of the first guess
 _EDGES = 8  # of a linearised friction cone
+_PIVOT_RANK = 5  # of the grasp map of two contacts
 _GATE = 0.05  # m·g, unbalanced wrench that the gate lets pass: what the soft stages leave anyway
 
 
@@ -32,6 +33,17 @@ def inward_normals(points: Array, capsules: Array) -> Array:
         outward = point - capsule[:3] - fraction * along
         normals.append(-outward / max(float(np.linalg.norm(outward)), 1e-9))
     return np.array(normals)
+
+
+def on_capsules(points: Array, capsules: Array, inward: Array) -> Array:
+    """Points (C, 3) moved along their normals onto capsules (C, 7), object frame."""
+    moved = []
+    for point, capsule, normal in zip(points, capsules, inward, strict=True):
+        along = capsule[3:6] - capsule[:3]
+        squared = float(along @ along)
+        fraction = np.clip((point - capsule[:3]) @ along / squared, 0, 1) if squared else 0.0
+        moved.append(capsule[:3] + fraction * along - capsule[6] * normal)
+    return np.array(moved)
 
 
 def _surfaces(model: Model) -> tuple[Array, Array, Array]:
@@ -87,10 +99,11 @@ def needed_wrenches(model: Model, pose: Array) -> Array:
     return np.array(wrenches)
 
 
-def passes_gate(model: Model, values: Mapping[str, Array]) -> bool:
+def passes_gate(model: Model, values: Mapping[str, Array], pivots: bool = False) -> bool:
     """Whether at every keyframe the active contacts have the rank of all contacts and can make the needed wrench.
 
-    The needed wrench is the motion's own: inertial forces less gravity, in the object's frame.
+    The needed wrench is the motion's own: inertial forces less gravity, in the object's frame. With ``pivots`` the
+    rank of two contacts is enough: the object may hang between them, free about their line, while a finger lifts.
     """
     wrenches_needed = needed_wrenches(model, values["pose"])
     _, capsules, friction = _surfaces(model)
@@ -99,8 +112,11 @@ def passes_gate(model: Model, values: Mapping[str, Array]) -> bool:
         points = values["point"][k].reshape(contacts, 3)
         active = values["activity"][k] > 0.5
         needed = wrenches_needed[k]
+        if not active.any():
+            return False
         grasp = grasp_map(points[active])
-        if np.linalg.matrix_rank(grasp, 1e-6) < np.linalg.matrix_rank(grasp_map(points), 1e-6):
+        all_hold = np.linalg.matrix_rank(grasp_map(points), 1e-6)
+        if np.linalg.matrix_rank(grasp, 1e-6) < (min(all_hold, _PIVOT_RANK) if pivots else all_hold):
             return False
         edges = friction_edges(inward_normals(points[active], capsules[active]), friction[active])
         wrenches = np.vstack([edges, np.zeros((3, edges.shape[1]))])

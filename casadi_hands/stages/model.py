@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from casadi_hands.motion import Schedule, linear, nearest_exponential
+from casadi_hands.motion import Schedule, held, linear, nearest_exponential
 from casadi_hands.task import Task
 
 Array = NDArray[np.float64]
@@ -60,6 +60,19 @@ class Ground:
 
 
 @dataclass(frozen=True)
+class Regrasp:
+    """Fingers that lift and touch again elsewhere, planned.
+
+    Attributes:
+        lifted: (N, C) bool, from its keyframe to the next; the ground's contact, if any, last.
+        patches: (N, C, 3) where contacts are wanted at the keyframes, object frame.
+    """
+
+    lifted: NDArray[np.bool_]
+    patches: Array
+
+
+@dataclass(frozen=True)
 class Model:
     """Everything the stages need of a task, nondimensional; arrays are read only by agreement.
 
@@ -91,6 +104,7 @@ class Model:
         joint_limits: lower and upper, rad.
         torque_limit: of a joint in m·g·length, or inf.
         speed_limit: of a joint in rad/s, or inf.
+        regrasp: planned, or None where fingers stay where they touch.
     """
 
     units: Units
@@ -120,11 +134,36 @@ class Model:
     joint_limits: tuple[float, float]
     torque_limit: float
     speed_limit: float
+    regrasp: Regrasp | None = None
 
     @property
     def contacts(self) -> int:
         """Number of finger contacts."""
         return len(self.contact_names)
+
+    @property
+    def keyframe_patches(self) -> Array:
+        """(N, C, 3) where contacts are wanted at the keyframes, object frame; the ground's, if any, last."""
+        if self.regrasp is not None:
+            return self.regrasp.patches
+        patches = self.patches if self.ground is None else np.vstack([self.patches, self.ground.patch])
+        return np.tile(patches, (len(self.schedule.keyframes), 1, 1))
+
+    def point_spline(self, contact: int, offset: float = 0.0) -> Array:
+        """(S, N) weights of a contact point at the samples, ``offset`` steps later.
+
+        Around a planned regrasp it stays where it lifts and where it touches, and has not moved before it touches.
+        """
+        schedule = self.schedule
+        if self.regrasp is None:
+            return schedule.spline(offset)
+        lifted = self.regrasp.lifted[:, contact]
+        ends = np.union1d(np.flatnonzero(lifted), np.flatnonzero(lifted) + 1)
+        weights = schedule.spline(offset, ends)
+        now, then = (held(schedule.keyframes, schedule.samples + o * schedule.step) for o in (0.0, offset))
+        touched = lifted[then] & ~lifted[now]
+        weights[touched] = schedule.spline(0.0, ends)[touched]
+        return weights
 
     @property
     def perturbed(self) -> bool:
@@ -198,6 +237,12 @@ def build_model(task: Task) -> Model:
         torque_limit=math.inf if actuator is None else round_off(actuator.torque / units.torque),
         speed_limit=math.inf if actuator is None else actuator.speed,
     )
+
+
+def palm_from_world(model: Model, time: float) -> tuple[Array, Array]:
+    """Rotation (3, 3) palm <- world and the palm's position (3,) in the world at a time."""
+    sample = int(np.argmin(np.abs(model.schedule.samples - time)))
+    return pin.Quaternion(*model.palm_quaternion[sample]).matrix().T, model.palm_position[sample]
 
 
 def _nearest_primitive(point: Array, primitives: Array) -> Array:

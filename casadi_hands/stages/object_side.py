@@ -70,13 +70,26 @@ def declare_object(problem: Problem, model: Model) -> ObjectSide:
     before, now, after = (schedule.spline(offset) for offset in (-1, 0, 1))
     return ObjectSide(
         pose=(pose.combine(before), pose.combine(now), pose.combine(after)),
-        point=(point.combine(before), point.combine(now), point.combine(after)),
+        point=tuple(_points(model, point, offset) for offset in (-1, 0, 1)),  # type: ignore[arg-type]
         force=force,
         perturbed=perturbed,
         activity=activity.take(schedule.sample_keyframes),
         keyframe_pose=pose,
         keyframe_activity=activity,
     )
+
+
+def _points(model: Model, keyframes: Rows, offset: float) -> Rows:
+    """Contact points (S, 3C) at the samples, ``offset`` steps later."""
+    if model.regrasp is None:
+        return keyframes.combine(model.schedule.spline(offset))
+    contacts = range(sizes(model)[2])
+    return Rows.beside([keyframes.entries(3 * c, 3 * c + 3).combine(model.point_spline(c, offset)) for c in contacts])
+
+
+def sampled_points(model: Model, keyframes: Array) -> Array:
+    """Contact points (S, C, 3) at the samples from those at the keyframes (N, C, 3)."""
+    return np.stack([model.point_spline(c) @ keyframes[:, c] for c in range(keyframes.shape[1])], axis=1)
 
 
 def bind_object(problem: Problem, model: Model, side: ObjectSide, palm: Rows | None = None) -> None:
@@ -126,11 +139,11 @@ def _bind_scenario(problem: Problem, model: Model, side: ObjectSide, force: Rows
 
 def _bind_points(problem: Problem, model: Model, side: ObjectSide) -> None:
     p, contacts = problem.parameters, sizes(model)[2]
-    patches = problem.parameter("patches", (contacts, 3))
+    patches = problem.parameter("patches", (sizes(model)[1], 3 * contacts))
     kernel = kernels.contact_motion()
     for i in range(contacts):
         rows = [points.entries(3 * i, 3 * i + 3) for points in side.point]
-        problem.bind(kernel, rows, [patches[i : i + 1], p["step"]])
+        problem.bind(kernel, rows, [patches[:, 3 * i : 3 * i + 3], p["step"]])
     least = min(2, model.contacts)
     problem.bind(kernels.enough_contacts(contacts), [side.keyframe_activity], [], {"sum": (least, np.inf)})
 
@@ -194,7 +207,6 @@ def pose_bounds(model: Model) -> tuple[Array, Array]:
 def object_parameters(model: Model) -> dict[str, Array | float]:
     """Values of all parameters of the object's side but the weights."""
     ground = model.ground
-    patches = model.patches if ground is None else np.vstack([model.patches, ground.patch])
     values: dict[str, Array | float] = {
         "reference": model.reference,
         "step": model.schedule.step,
@@ -205,7 +217,7 @@ def object_parameters(model: Model) -> dict[str, Array | float]:
         "friction": model.friction,
         "clearance": CLEARANCE,
         "ground_height": NO_GROUND if ground is None else ground.height,
-        "patches": patches,
+        "patches": model.keyframe_patches[model.schedule.sample_keyframes].reshape(sizes(model)[1], -1),
         "palm_position": model.palm_position,
         "palm_quaternion": model.palm_quaternion,
         "palm_radius": model.palm_radius,

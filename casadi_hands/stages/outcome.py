@@ -13,10 +13,10 @@ from casadi_hands.design import Finger, Hand, Link, Motion
 from casadi_hands.kinematics import finger_kinematics
 from casadi_hands.motion import catmull_rom
 from casadi_hands.stages.floating import Floating
-from casadi_hands.stages.grasp import inward_normals
+from casadi_hands.stages.grasp import inward_normals, on_capsules
 from casadi_hands.stages.model import Model, quaternion
+from casadi_hands.stages.object_side import sampled_points
 from casadi_hands.stages.synthesis import FingerSeed
-from casadi_hands.stages.target import on_capsules
 from casadi_hands.stages.whole_hand import WholeHand
 from casadi_hands.task import Task
 
@@ -70,7 +70,7 @@ def floating_motion(model: Model, floating: Floating) -> Motion:
     spline = catmull_rom(schedule.keyframes, schedule.samples)
     pose = spline @ floating.pose
     count = len(schedule.samples)
-    point = (spline @ floating.point.reshape(len(floating.point), -1)).reshape(count, -1, 3)
+    point = sampled_points(model, floating.point)
     active = floating.active[schedule.sample_keyframes]
     names = model.contact_names + (("ground",) if model.ground is not None else ())
     links = ["none"] * model.contacts + (["ground"] if model.ground is not None else [])

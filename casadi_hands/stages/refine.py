@@ -146,8 +146,8 @@ class RefineStage:
         for i, c in enumerate(self.contacts):
             active = structure.active[structure.touching[:, i], i]
             always[f"contact{c}.pressing"] = (np.where(active, margin.normal_force, 0.0)[:, None], np.inf)
-            for name in ("on_object", "on_link"):
-                exact[f"contact{c}.{name}"] = (-model.gap_tolerance, model.gap_tolerance)
+            # The point stays on the object's surface, where its force acts; the link may be a little off it.
+            exact[f"contact{c}.on_link"] = (-model.gap_tolerance, model.gap_tolerance)
             slip = model.slip_tolerance / (np.sqrt(2) * longest_run(structure.active[:, i]))
             exact[f"rolling{c}.no_slip"] = (-slip, slip)
             for kernel in ("contact", "held"):

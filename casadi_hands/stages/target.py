@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from casadi_hands.motion import catmull_rom
 from casadi_hands.stages.floating import Floating
-from casadi_hands.stages.grasp import inward_normals
-from casadi_hands.stages.model import Model
+from casadi_hands.stages.grasp import inward_normals, on_capsules
+from casadi_hands.stages.model import Model, palm_from_world
 
 Array = NDArray[np.float64]
 _NO_GROUND = -1e3
@@ -109,12 +109,6 @@ def string_of(active: NDArray[np.bool_]) -> NDArray[np.int64]:
     return np.clip(np.where(active, strings, strings + 1), 0, max(int(starts.sum()) - 1, 0))
 
 
-def palm_from_world(model: Model, time: float) -> tuple[Array, Array]:
-    """Rotation (3, 3) palm <- world and the palm's position (3,) in the world at a time."""
-    sample = int(np.argmin(np.abs(model.schedule.samples - time)))
-    return pin.Quaternion(*model.palm_quaternion[sample]).matrix().T, model.palm_position[sample]
-
-
 def target_of(model: Model, floating: Floating) -> Target:
     """See a floating motion from the palm; contact points are moved onto the object's surface."""
     schedule, contacts = model.schedule, model.contacts
@@ -144,14 +138,3 @@ def target_of(model: Model, floating: Floating) -> Target:
         pose=floating.pose,
         model=model,
     )
-
-
-def on_capsules(points: Array, capsules: Array, inward: Array) -> Array:
-    """Points (C, 3) moved along their normals onto capsules (C, 7), object frame."""
-    moved = []
-    for point, capsule, normal in zip(points, capsules, inward, strict=True):
-        along = capsule[3:6] - capsule[:3]
-        squared = float(along @ along)
-        fraction = np.clip((point - capsule[:3]) @ along / squared, 0, 1) if squared else 0.0
-        moved.append(capsule[:3] + fraction * along - capsule[6] * normal)
-    return np.array(moved)

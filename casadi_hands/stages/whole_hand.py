@@ -14,19 +14,20 @@ from casadi_hands.nlp import Options, Problem, Rows, Solution, Solver
 from casadi_hands.stages import hand_kernels as kernels
 from casadi_hands.stages.finger_numbers import contact_kinematics
 from casadi_hands.stages.floating import Floating
-from casadi_hands.stages.grasp import inward_normals
-from casadi_hands.stages.model import Model, quaternion
+from casadi_hands.stages.grasp import inward_normals, on_capsules
+from casadi_hands.stages.model import Model, palm_from_world, quaternion
 from casadi_hands.stages.object_side import (
     NO_GROUND,
     bind_object,
     declare_object,
     object_parameters,
     pose_bounds,
+    sampled_points,
     sizes,
     term_weights,
 )
 from casadi_hands.stages.synthesis import MARGIN, FingerSeed
-from casadi_hands.stages.target import on_capsules, palm_from_world, string_of
+from casadi_hands.stages.target import string_of
 
 Array = NDArray[np.float64]
 # An adaptive barrier took a fifth of the iterations of a monotone one where the start is far from the contacts.
@@ -220,7 +221,7 @@ class WholeHandStage:
             position = position + offset[:, :3]
             orientation = np.array([_turned(q, v) for q, v in zip(orientation, offset[:, 3:], strict=True)])
         active = floating.active[schedule.sample_keyframes]
-        point = (catmull_rom(schedule.keyframes, schedule.samples) @ values["point"]).reshape(-1, contacts, 3)
+        point = sampled_points(model, values["point"].reshape(-1, contacts, 3))
         return WholeHand(
             fingers=moved,
             contacts=self.contacts,
