@@ -15,7 +15,7 @@ from casadi_hands.stages.kernels import placed
 from casadi_hands.stages.surface import from_axis, smooth_surface, tangents
 from casadi_hands.terms import clearance, finger
 
-LEVER_DAMPING = 0.04  # half extents/rad: forces that need a shorter lever than about this count as not supplied
+LEVER = 0.06  # half extents/rad: forces that need a shorter lever than about this count as not supplied
 
 
 def free_morphology(kernel: Kernel, joints: int, tag: str = "") -> FingerSymbols:
@@ -125,7 +125,7 @@ def _hold(kernel: Kernel, touch: Touch, force: SX, friction: SX, limited: bool) 
     kernel.constrain("pressing", pressing)
     kernel.constrain("cone", (friction * pressing) ** 2 - across)
     in_palm = ca.mtimes(touch.rotation, force)
-    passive = finger.null_space_force(touch.placed.jacobian, in_palm, LEVER_DAMPING)
+    passive = finger.unsupplied_force(touch.placed.jacobian, in_palm, LEVER)
     kernel.constrain("passive", passive)
     if limited:
         kernel.constrain("torque", ca.mtimes(touch.placed.jacobian.T, in_palm))

@@ -47,7 +47,7 @@ class Margin:
 
     friction: float = 0.5
     normal_force: float = 1.0
-    passive: float = 0.009
+    passive: float = 0.0075
 
 
 WEIGHTS = {
@@ -105,6 +105,9 @@ class RefineStage:
         self.structure = Structure.of(model, contacts, joints, active)
         built = RefineProblem(self.structure)
         self.problem, self.pushed, self.knots = built.problem, built.pushed, built.knots
+        # A contact that touches anew bears nothing until it does: its force grows from zero.
+        active = self.structure.active
+        self.bearing = active & np.vstack([active[:1], active[:-1]])
         self.solver = Solver(self.problem)
 
     def solve(self, start: WholeHand, margin: Margin | None = None) -> Refined:
@@ -144,8 +147,8 @@ class RefineStage:
         always: Bounds = {}
         exact: Bounds = {}
         for i, c in enumerate(self.contacts):
-            active = structure.active[structure.touching[:, i], i]
-            always[f"contact{c}.pressing"] = (np.where(active, margin.normal_force, 0.0)[:, None], np.inf)
+            bearing = self.bearing[structure.touching[:, i], i]
+            always[f"contact{c}.pressing"] = (np.where(bearing, margin.normal_force, 0.0)[:, None], np.inf)
             # The point stays on the object's surface, where its force acts; the link may be a little off it.
             exact[f"contact{c}.on_link"] = (-model.gap_tolerance, model.gap_tolerance)
             slip = model.slip_tolerance / (np.sqrt(2) * longest_run(structure.active[:, i]))
@@ -179,7 +182,7 @@ class RefineStage:
             low_pose[at], high_pose[at] = goals - tolerance, goals + tolerance
         rate = np.full((count, 6), np.inf)
         rate[[0, -1]] = 0.0
-        force = np.repeat(np.where(self.structure.active, MOST_FORCE, 0.0), 3, axis=1)
+        force = np.repeat(np.where(self.bearing, MOST_FORCE, 0.0), 3, axis=1)
         upper = {"rate": rate, "force": force}
         if len(self.pushed):
             upper["force_pushed"] = force[self.pushed]
@@ -190,7 +193,7 @@ class RefineStage:
         count, chosen = self.knots, self.structure.columns
         rates, wrenches = rates_and_wrenches(self.model, start.position, start.vector)
         points = start.point[:, chosen]
-        forces = balanced(points, start.force[:, chosen], self.structure.active, wrenches)
+        forces = balanced(points, start.force[:, chosen], self.bearing, wrenches)
         values = {
             "pose": np.hstack([start.position, start.vector]),
             "rate": rates,

@@ -25,6 +25,22 @@ def null_space_force(jacobian: SX, force: SX, damping: float = NULL_SPACE_DAMPIN
     return force - ca.mtimes(jacobian, solve_positive(normal_matrix, ca.mtimes(jacobian.T, force)))
 
 
+def unsupplied_force(jacobian: SX, force: SX, lever: float) -> SX:
+    """The part (3,) of a force for which no joint has a lever: a sharper cut than damping.
+
+    Of a force in a singular direction of the Jacobian with the lever σ, λ⁴/(σ⁴ + λ⁴) counts as not supplied.
+
+    Args:
+        jacobian: (3, n) of the contact point, lengths/rad.
+        force: (3,) in the same frame, m·g.
+        lever: λ, lengths/rad.
+    """
+    squared = ca.mtimes(jacobian.T, jacobian)
+    normal_matrix = ca.mtimes(squared, squared) + lever**4 * SX.eye(jacobian.shape[1])
+    torques = ca.mtimes(squared, ca.mtimes(jacobian.T, force))
+    return force - ca.mtimes(jacobian, solve_positive(normal_matrix, torques))
+
+
 def null_space(jacobian: SX, force: SX) -> SX:
     """Size of ``null_space_force`` in m·g, rounded off at zero; a plain value."""
     return ca.sqrt(ca.sumsqr(null_space_force(jacobian, force)) + 1e-4)
