@@ -28,6 +28,15 @@ def test_catmull_rom_passes_through_keyframes_and_keeps_constants() -> None:
     np.testing.assert_allclose(catmull_rom(KNOTS, np.linspace(-0.1, 3.1, 50)).sum(axis=1), 1, atol=1e-14)
 
 
+@pytest.mark.parametrize("resting", [[2], [1, 4], np.array([0, 3, 5])])
+def test_catmull_rom_rests_where_it_is_told_to(resting: list[int]) -> None:
+    slopes = tangents()
+    slopes[resting] = 0
+    times = np.linspace(0, 3, 101)
+    expected = CubicHermiteSpline(KNOTS, VALUES, slopes)(times)
+    np.testing.assert_allclose(catmull_rom(KNOTS, times, resting) @ VALUES, expected, atol=1e-12)
+
+
 @pytest.mark.parametrize("end", [0.0, 3.0])
 def test_catmull_rom_is_at_rest_and_mirrored_at_its_ends(end: float) -> None:
     h = 1e-4

@@ -61,3 +61,11 @@ def test_rows_read_combine_take_and_split() -> None:
     np.testing.assert_allclose(
         read(rows.combine(weights).entries(0, 2).take([4])), (weights @ plain)[[4], :2], atol=1e-14
     )
+
+
+def test_rows_beside_each_other_have_the_entries_of_all() -> None:
+    x = RANDOM.normal(size=20)
+    first, second = RANDOM.permutation(20)[:12].reshape(4, 3), RANDOM.permutation(20)[:8].reshape(4, 2)
+    rows = Rows.beside([Rows.of(first, 20), Rows.of(second, 20), Rows.of(first, 20).entries(1, 2)])
+    assert (rows.count, rows.width) == (4, 6)
+    np.testing.assert_array_equal((rows.matrix @ x).reshape(4, 6), np.hstack([x[first], x[second], x[first][:, 1:2]]))

@@ -125,6 +125,7 @@ def made_up_floating(model: Model, seed: int = 0) -> Floating:
         threshold=0.2,
         solution=made_up_solution(values),
         runs=(),
+        model=model,
     )
 
 
