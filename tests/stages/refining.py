@@ -70,6 +70,12 @@ class MadeUp:
             [[flags[k, c] or (k > 0 and flags[k - 1, c]) for c in range(flags.shape[1])] for k in range(len(flags))]
         )
 
+    @property
+    def bearing(self) -> Array:
+        """Flags (S, columns): active, and touching already at the knot before; the first knot bears at once."""
+        flags = self.active[:, self.stage.structure.columns]
+        return np.array([flags[k] & flags[max(k - 1, 0)] for k in range(len(flags))])
+
     def parameters(self, weights: Mapping[str, float], margin: Margin | None = None) -> dict[str, object]:
         given = self.stage._parameters(self.start, margin or Margin())
         terms = self.stage.problem.terms

@@ -49,12 +49,13 @@ def drawn() -> MadeUp:
     return MadeUp(drawing()[1], (0, 1), lifted={1: (4, 7)})
 
 
-def test_forces_vanish_where_contacts_are_broken_and_the_object_rests_at_both_ends(made_up: MadeUp) -> None:
+def test_forces_vanish_where_contacts_bear_nothing_and_the_object_rests_at_both_ends(made_up: MadeUp) -> None:
     lower, upper = made_up.stage._bounds()
-    active = made_up.start.active
-    for column, contact in enumerate((0, 2, 3)):
+    # One that touches anew, the second at sample 7, bears nothing yet: forces grow from zero.
+    assert made_up.bearing[:, 1].tolist() == [True] * 4 + [False] * 4 + [True] * (len(upper["force"]) - 8)
+    for column in range(3):
         for row in range(3 * column, 3 * column + 3):
-            np.testing.assert_array_equal(upper["force"][:, row] == 0, ~active[:, contact])
+            np.testing.assert_array_equal(upper["force"][:, row] == 0, ~made_up.bearing[:, column])
     pushed = made_up.stage.pushed
     np.testing.assert_array_equal(upper["force_pushed"], upper["force"][pushed])
     assert (upper["force_pushed"] == 0).any()
@@ -88,11 +89,10 @@ def test_a_drawing_s_goals_bound_its_tool_and_not_its_pose(drawn: MadeUp) -> Non
     np.testing.assert_array_equal(high[~at], TOOL_TOLERANCE)
 
 
-def test_margins_are_bounds_of_contacts_while_they_are_active(made_up: MadeUp) -> None:
+def test_margins_are_bounds_of_contacts_while_they_bear(made_up: MadeUp) -> None:
     always, *others = made_up.stage._constraint_bounds(Margin(normal_force=0.7, passive=0.02))
-    active, touching = made_up.active[:, 2], made_up.touching[:, 1]
     low, high = always["contact2.pressing"]
-    np.testing.assert_array_equal(np.ravel(low), np.where(active, 0.7, 0.0)[touching])
+    np.testing.assert_array_equal(np.ravel(low), np.where(made_up.bearing[:, 1], 0.7, 0.0)[made_up.touching[:, 1]])
     assert high == np.inf
     exact = {name: bounds for part in others for name, bounds in part.items()}
     for c in (0, 2):
