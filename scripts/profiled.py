@@ -1,0 +1,109 @@
+"""Where the time of a solve goes: by stage, and within a stage by kind."""
+
+from __future__ import annotations
+
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+from casadi_hands import load_task, solve
+from casadi_hands.nlp import Options, Solution, Solver
+from casadi_hands.stages.floating import FloatingStage
+from casadi_hands.stages.refine import RefineStage
+from casadi_hands.stages.synthesis import SynthesisStage
+from casadi_hands.stages.whole_hand import WholeHandStage
+
+KINDS = ("building", "value", "gradient", "Jacobian", "Hessian", "rest of IPOPT")
+_CALLED = {"value": ("nlp_f", "nlp_g"), "gradient": ("nlp_grad_f",), "Jacobian": ("nlp_jac_g",)}
+_CALLED["Hessian"] = ("nlp_hess_l",)
+Seconds = dict[str, dict[str, float]]
+
+
+class Ledger:
+    """Seconds by stage and kind, and iterations and solves by stage, of what this process solves.
+
+    Attributes:
+        stage: that time is booked on.
+        seconds: stage -> kind -> s.
+        iterations: stage -> IPOPT's iterations.
+        solves: stage -> calls of IPOPT.
+    """
+
+    def __init__(self) -> None:
+        self.stage = ""
+        self.seconds: Seconds = defaultdict(lambda: defaultdict(float))
+        self.iterations: dict[str, int] = defaultdict(int)
+        self.solves: dict[str, int] = defaultdict(int)
+        self._building = 0
+
+    @contextmanager
+    def open(self) -> Iterator[Ledger]:
+        """Book every stage that is built and every solve meanwhile."""
+        stages = (FloatingStage, SynthesisStage, WholeHandStage, RefineStage)
+        patches = [patch.object(stage, "__init__", self._timed(stage.__init__)) for stage in stages]
+        patches += [patch.object(Solver, "_solver", self._timed(Solver._solver))]
+        patches += [patch.object(Solver, "solve", self._booked(Solver.solve))]
+        for each in patches:
+            each.start()
+        try:
+            yield self
+        finally:
+            for each in patches:
+                each.stop()
+
+    def _timed(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        def timed(*given: Any, **named: Any) -> Any:
+            self._building += 1
+            began = time.perf_counter()
+            try:
+                return function(*given, **named)
+            finally:
+                self._building -= 1
+                if not self._building:
+                    self.seconds[self.stage]["building"] += time.perf_counter() - began
+
+        return timed
+
+    def _booked(self, function: Callable[..., Solution]) -> Callable[..., Solution]:
+        def booked(solver: Solver, start: Any, parameters: Any, options: Any = None, *rest: Any, **named: Any) -> Any:
+            solution = function(solver, start, parameters, options, *rest, **named)
+            record = solver._solver(options or Options()).stats()
+            booked = self.seconds[self.stage]
+            left = solution.seconds
+            for kind, names in _CALLED.items():
+                seconds = sum(record[f"t_wall_{name}"] for name in names)
+                booked[kind] += seconds
+                left -= seconds
+            booked["rest of IPOPT"] += left
+            self.iterations[self.stage] += solution.iterations
+            self.solves[self.stage] += 1
+            return solution
+
+        return booked
+
+
+def profiled_solve(task_file: Path, seed: int) -> dict[str, Any]:
+    """Solve a task in this process alone and say where the time went.
+
+    Returns:
+        ``status``; ``total`` s; ``seconds`` stage -> kind -> s, where ``all`` is the stage's time; ``iterations`` and
+        ``solves`` by stage.
+    """
+    ledger = Ledger()
+    task = load_task(task_file)
+    with ledger.open():
+        design = solve(task, seed=seed, jobs=1, progress=lambda news: setattr(ledger, "stage", news.stage))
+    seconds = {name: dict(kinds) for name, kinds in ledger.seconds.items()}
+    for stage in seconds:
+        seconds[stage]["all"] = design.seconds[stage]
+    return {
+        "status": design.status,
+        "total": design.seconds["total"],
+        "seconds": seconds,
+        "iterations": dict(ledger.iterations),
+        "solves": dict(ledger.solves),
+    }
