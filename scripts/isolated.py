@@ -5,10 +5,12 @@ from __future__ import annotations
 import multiprocessing
 import os
 import resource
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 Value = TypeVar("Value")
@@ -47,17 +49,17 @@ def isolated(function: Callable[..., Value], *arguments: Any, limit: float) -> O
     began = time.perf_counter()
     process.start()
     theirs.close()
-    value, failure, kilobytes = None, f"stopped after {limit:g} s", 0
+    value, failure, megabytes = None, f"stopped after {limit:g} s", 0.0
     try:
         if ours.poll(limit):
-            value, failure, kilobytes = ours.recv()
+            value, failure, megabytes = ours.recv()
     except EOFError:
         failure = "the process died"
     finally:
         process.kill()
         process.join()
         ours.close()
-    return Outcome(value, failure, kilobytes / 1024, time.perf_counter() - began)
+    return Outcome(value, failure, megabytes, time.perf_counter() - began)
 
 
 def _answer(pipe: Connection, function: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
@@ -66,5 +68,15 @@ def _answer(pipe: Connection, function: Callable[..., Any], arguments: tuple[Any
         value = function(*arguments)
     except Exception as error:
         failure = f"{type(error).__name__}: {error}"
-    pipe.send((value, failure, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss))
+    pipe.send((value, failure, largest_memory()))
     pipe.close()
+
+
+def largest_memory() -> float:
+    """Largest resident memory of this process until now, in 2^20 bytes."""
+    status = Path("/proc/self/status")
+    if status.exists():
+        # What getrusage says of a fresh process is at least what its parent had.
+        lines = dict(line.split(":", 1) for line in status.read_text(encoding="utf-8").splitlines())
+        return int(lines["VmHWM"].split()[0]) / 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**20 if sys.platform == "darwin" else 1024)
