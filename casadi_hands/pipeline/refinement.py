@@ -49,6 +49,7 @@ _LIMITS = {  # by the constraint's kernel, without the finger's number, and name
     "physics.defect": _MOVED,
     "wrench.sum": _MOVED,
     "middle_torque.sum": _MOVED,
+    "equilibrium.sum": _Limit("be held still at the start and the end", "", _PACE, _BALANCE),
     "pushed.sum": _Limit("stay on its path under the perturbation", "", _PUSHED, ("disturbance_radius",)),
     "contact.on_object": _Limit("stay on the object's surface", "length", _REACH, (*_GAP, *_BALANCE, "slip")),
     "contact.on_link": _Limit("reach its contact", "length", _REACH, (*_GAP, *_BALANCE, "slip")),

@@ -227,6 +227,18 @@ def joint_motion(joints: int, index: int, limited: bool) -> Kernel:
     return kernel
 
 
+def joint_jerk(joints: int, index: int) -> Kernel:
+    """How the acceleration of one finger's joints changes over four knots.
+
+    Between knots joints move on smooth curves, which leave the paths that roll where accelerations change abruptly.
+    """
+    kernel = Kernel(f"joint_jerk{index}")
+    angles = [kernel.variable(f"angles{i}", joints) for i in range(4)]
+    step = kernel.parameter("step")
+    kernel.cost("joint_jerk", (angles[3] - 3 * angles[2] + 3 * angles[1] - angles[0]) / step**3)
+    return kernel
+
+
 def stay(joints: int, index: int) -> Kernel:
     """A finger's morphology: short, on the palm, and near what the synthesis found."""
     kernel = Kernel(f"stay{index}")

@@ -97,6 +97,16 @@ def pushed(contacts: int) -> Kernel:
     return kernel
 
 
+def equilibrium() -> Kernel:
+    """The contacts' wrench that holds the object still at one knot: a motion starts and ends without a jolt."""
+    kernel = Kernel("equilibrium")
+    pose, total = kernel.variable("pose", 6), kernel.variable("total", 6)
+    reference, gravity = kernel.parameter("reference", 4), kernel.parameter("gravity", 3)
+    _, quaternion = placed(pose, reference)
+    kernel.constrain("sum", ca.vertcat(ca.mtimes(rotation_matrix(quaternion), total[:3]) + gravity, total[3:]))
+    return kernel
+
+
 def force_change(contacts: int) -> Kernel:
     """Change of the contact forces from one knot to the next."""
     kernel = Kernel("force_change")

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from casadi_hands.motion import Schedule, held, linear, nearest_exponential
+from casadi_hands.motion import Schedule, eased, held, linear, nearest_exponential
 from casadi_hands.task import Task
 
 Array = NDArray[np.float64]
@@ -274,12 +274,12 @@ def _goals(task: Task) -> tuple[Array, Array, Array]:
 
 
 def _palm(task: Task, schedule: Schedule) -> tuple[Array, Array]:
-    """Palm positions (S, 3) in m and quaternions (S, 4) at the samples, between the task's waypoints."""
+    """Palm positions (S, 3) in m and quaternions (S, 4) at the samples: straight between waypoints, at rest at each."""
     times, positions, rotations = zip(*task.palm.waypoints, strict=True)
     if len(times) == 1:
         count = len(schedule.samples)
         return np.tile(positions[0], (count, 1)), np.tile(quaternion(rotations[0]), (count, 1))
-    weights = linear(times, schedule.samples)
+    weights = linear(times, eased(times, schedule.samples))
     quaternions = []
     for row in weights:
         later = int(np.flatnonzero(row)[-1])

@@ -28,6 +28,7 @@ SOFT = Options(max_iter=150, tol=1e-3, acceptable_tol=1e-2, constr_viol_tol=1e-4
 CLOSER = Options(max_iter=100, tol=1e-3, acceptable_tol=1e-2, constr_viol_tol=1e-6, mu_init=1e-6, extra=_NEAR)
 HARD = Options(max_iter=100, tol=1e-6, acceptable_tol=1e-5, constr_viol_tol=1e-10, mu_init=1e-6, extra=_NEAR)
 HARD_FROM_AFAR = Options(max_iter=300, tol=1e-6, acceptable_tol=1e-5, constr_viol_tol=1e-10, mu_init=1e-4, extra=_NEAR)
+EASED = 5  # knots over which a contact that touches or lifts comes to press with its full force, or to let go
 AFAR = 0.01  # half extents of slip that the firm solve leaves: more is much
 TOOL_TOLERANCE = 5e-3  # half extents, how far a drawing's tool may leave its path between goals
 ACCEPTED = 1e-7  # largest violation with which a refined motion is handed on
@@ -59,6 +60,7 @@ WEIGHTS = {
     "friction_margin": 0.02,
     "force_change": 0.5,
     "joint_acceleration": 1e-3,
+    "joint_jerk": 3e-3,
     "object_acceleration": 1e-2,
     "stay_design": 0.02,
     "stay_path": 1.0,
@@ -147,8 +149,8 @@ class RefineStage:
         always: Bounds = {}
         exact: Bounds = {}
         for i, c in enumerate(self.contacts):
-            bearing = self.bearing[structure.touching[:, i], i]
-            always[f"contact{c}.pressing"] = (np.where(bearing, margin.normal_force, 0.0)[:, None], np.inf)
+            floor = margin.normal_force * eased_in(self.bearing[:, i])[structure.touching[:, i]]
+            always[f"contact{c}.pressing"] = (floor[:, None], np.inf)
             # The point stays on the object's surface, where its force acts; the link may be a little off it.
             exact[f"contact{c}.on_link"] = (-model.gap_tolerance, model.gap_tolerance)
             slip = model.slip_tolerance / (np.sqrt(2) * longest_run(structure.active[:, i]))
@@ -286,6 +288,15 @@ class RefineStage:
         worst = max(solution.violations.items(), key=lambda item: item[1])
         exact = runs[-1][0] == "exact" and worst[1] <= ACCEPTED
         return Refined(hand, exact, worst, slips, moved, tuple(runs))
+
+
+def eased_in(bearing: NDArray[np.bool_]) -> Array:
+    """Share (S,) of the normal force asked of a contact: it grows after a touch and falls before a lift, over knots."""
+    idle = np.flatnonzero(~bearing)
+    if not len(idle):
+        return np.ones(len(bearing))
+    away = np.abs(np.arange(len(bearing))[:, None] - idle).min(axis=1)
+    return np.minimum(away / EASED, 1.0)
 
 
 def longest_run(flags: NDArray[np.bool_]) -> int:

@@ -151,6 +151,8 @@ class RefineProblem:
         common = self._at(("reference", "step", "gravity", "inertial", "inertia", "inverse"))
         problem.bind(body.physics(), [*states, *wrenches], common, {"defect": (0, 0)})
         problem.bind(body.wrench(columns), [self.wrench, self.point, self.force], [], {"sum": (0, 0)})
+        still = [r.take([0, self.knots - 1]) for r in (self.pose, self.wrench)]
+        problem.bind(body.equilibrium(), still, self._at(("reference", "gravity")), {"sum": (0, 0)})
         ends = [r.take(k) for k in (now, later) for r in (self.point, self.force)]
         problem.bind(body.middle_torque(columns), [self.middle, *ends], [], {"sum": (0, 0)})
         problem.bind(body.force_change(columns), [self.force.take(now), self.force.take(later)])
@@ -254,6 +256,10 @@ class RefineProblem:
         three = [self.angles[i].take(mirrored[offset : offset + count]) for offset in range(3)]
         steps = self._at(("step",), np.clip(np.arange(count) - 1, 0, count - 2))
         problem.bind(finger.joint_motion(n, c, np.isfinite(speed)), three, steps, {"speed": (-speed, speed)})
+        switches = np.flatnonzero(np.diff(structure.active[:, i].astype(int))) + 1
+        first = np.array([k for k in range(count - 3) if k + 1 not in switches and k + 2 not in switches], int)
+        four = [self.angles[i].take(first + offset) for offset in range(4)]
+        problem.bind(finger.joint_jerk(n, c), four, self._at(("step",), first))
         wanted = self._at((f"wanted_base{c}", f"wanted_lengths{c}", f"wanted_axes{c}"))
         reach = (model.palm_radius - model.link_radius) ** 2
         problem.bind(finger.stay(n, c), self.shape[i], wanted, {"on_palm": (0, reach)})

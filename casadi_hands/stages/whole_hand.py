@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from casadi_hands.motion import catmull_rom
 from casadi_hands.nlp import Options, Problem, Rows, Solution, Solver
@@ -217,7 +218,8 @@ class WholeHandStage:
         )
         position, orientation = model.palm_position, model.palm_quaternion
         if self.palm_moves:
-            offset = catmull_rom(schedule.keyframes, schedule.samples) @ values["palm"]
+            # Twice differentiable, as a palm moves that carries a load.
+            offset = CubicSpline(schedule.keyframes, values["palm"], bc_type="clamped")(schedule.samples)
             position = position + offset[:, :3]
             orientation = np.array([_turned(q, v) for q, v in zip(orientation, offset[:, 3:], strict=True)])
         active = floating.active[schedule.sample_keyframes]
