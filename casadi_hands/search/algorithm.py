@@ -100,9 +100,10 @@ class Search:
             candidates = self._recombine(sum(joints.values()))
             best = candidates[0]
             scores = dict(zip(self.contacts, best.scores, strict=True))
-            growing = {c for c in self.contacts if joints[c] < self.max_joints and scores[c] >= self.threshold}
+            # Compared so that a score that is no number lacks.
+            lacking = [c for c in self.contacts if not scores[c] < self.threshold]
+            growing = {c for c in lacking if joints[c] < self.max_joints}
             if not growing:
-                lacking = [c for c in self.contacts if scores[c] >= self.threshold]
                 farthest = max((worst_miss(self.target, best.hand, c)[0] for c in lacking), default=0.0)
                 short = tuple(shortcoming(self.target, best.hand, c, scores[c]) for c in lacking)
                 return Found(tuple(candidates), farthest, short)
@@ -191,4 +192,6 @@ def _alone(result: Synthesised) -> float:
 def _sample(pool: list[tuple[float, FingerSeed]], rng: np.random.Generator) -> int:
     """Index of a finger drawn with chances in inverse proportion to scores."""
     chances = np.array([1 / max(score, 1e-6) for score, _ in pool])
+    if not chances.sum() > 0:  # no trial came to anything
+        return int(rng.integers(len(pool)))
     return int(rng.choice(len(pool), p=chances / chances.sum()))

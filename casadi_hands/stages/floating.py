@@ -25,6 +25,7 @@ from casadi_hands.stages.regrasp import planned_regrasp
 
 Array = NDArray[np.float64]
 THRESHOLDS = (0.1, 0.2, 0.3)
+REGRASP_ROOM = 0.15  # half extents about its patches, for a contact that is taken anew
 OPTIONS = Options(max_iter=300, tol=1e-4, acceptable_tol=1e-3, extra=(("mu_strategy", "adaptive"),))
 
 
@@ -107,7 +108,8 @@ class FloatingStage:
         for flags, threshold in self._candidates(free.values["activity"]):
             solution = self._with_flags(flags, free, parameters)
             runs.append((f"threshold {threshold}", solution))
-            if (best is None or solution.objective < best[1]) and passes_gate(self.model, solution.values):
+            better = solution.objective < (np.inf if best is None else best[1])
+            if better and passes_gate(self.model, solution.values):
                 best = (threshold, solution.objective, solution)
         if best is None:
             solution = self._with_flags(np.ones_like(free.values["activity"]), free, parameters)
@@ -135,7 +137,12 @@ class FloatingStage:
         start = {**before.solution.values, "point": self.model.keyframe_patches.reshape(keyframes, -1)}
         flags = (before.active & ~self.model.regrasp.lifted).astype(float)
         fixed = {"activity": flags}
-        solution = self.solver.solve({**start, **fixed}, parameters, OPTIONS, lower=fixed, upper=fixed)
+        # Free, a contact that is to touch elsewhere would touch near where it was and slide there.
+        room = np.where(self.model.regrasp.lifted.any(axis=0), REGRASP_ROOM, np.inf)[None, :, None]
+        lower, upper = (
+            {**fixed, "point": (self.model.keyframe_patches + side * room).reshape(keyframes, -1)} for side in (-1, 1)
+        )
+        solution = self.solver.solve({**start, **fixed}, parameters, OPTIONS, lower=lower, upper=upper)
         if not passes_gate(self.model, solution.values, pivots=True):
             return None
         return replace(

@@ -135,7 +135,7 @@ class RefineStage:
             values = solution.values
             if what == "firm":
                 slips = self._slips(solution)
-                if max(slips.values()) > HOPELESS:
+                if not max(slips.values()) <= HOPELESS:  # nor where a solve broke down
                     break
         return self._result(start, runs, slips)
 

@@ -65,7 +65,7 @@ class Palm(Section):
     )
     motion: tuple[Waypoint, ...] | None = Field(
         default=None,
-        description="Poses that the palm passes through after the start: its motion, or, if it `moves`, a first guess.",
+        description="Poses at which the palm rests after the start: its motion, or, if it `moves`, a first guess.",
     )
 
     _direction = field_validator("facing", "up")(_check_direction)

@@ -1,0 +1,136 @@
+"""Planned regrasps: when a contact lets go, where it takes the object anew, and how its point moves meanwhile."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from casadi_hands.stages.floating import solve_floating
+from casadi_hands.stages.grasp import passes_gate
+from casadi_hands.stages.model import Model, Regrasp, build_model
+from casadi_hands.stages.object_side import sampled_points, straight_path
+from casadi_hands.stages.regrasp import FARTHEST, planned_regrasp
+from casadi_hands.task import parse_task
+
+Array = np.ndarray
+
+
+def turning(degrees: float, palm: str = "position: [0, 0, 0.3], facing: [1, 0, 0]") -> Model:
+    """A capsule that turns between two fingers, pushed by a third; three keyframes between its two goals."""
+    return build_model(
+        parse_task(f"""
+object: {{mass: 0.1, shapes: [{{capsule: {{start: [0, 0, -0.03], end: [0, 0, 0.03], radius: 0.02}}}}]}}
+palm: {{radius: 0.06, {palm}}}
+motion:
+  - {{at: 0, position: [0.11, 0, 0.3]}}
+  - {{at: 4, position: [0.11, 0, 0.3], rotation: {{axis: [0, 1, 0], degrees: {degrees}}}}}
+fingers:
+  left: {{touches: [0, 0.02, 0]}}
+  right: {{touches: [0, -0.02, 0]}}
+  top: {{touches: [-0.02, 0, 0.025]}}
+friction: 0.7
+keyframes_between: 3
+""")
+    )
+
+
+def test_a_contact_that_travels_little_stays() -> None:
+    model = turning(95)
+    assert planned_regrasp(model, straight_path(model)) is None
+
+
+def test_only_the_contact_off_the_axis_lets_go_and_takes_the_object_where_it_first_did() -> None:
+    model = turning(170)
+    pose = straight_path(model)
+    plan = planned_regrasp(model, pose)
+    assert plan is not None
+    # 42.5 degrees a keyframe: 127.5 are too many, so it lifts at the second and touches at the third.
+    np.testing.assert_array_equal(np.argwhere(plan.lifted), [[2, 2]])
+    np.testing.assert_allclose(plan.patches[:3], np.tile(model.patches, (3, 1, 1)))
+    turned = Rotation.from_rotvec(pose[3, 3:])
+    direction = turned.apply(plan.patches[3, 2])
+    first = model.patches[2]
+    # The object's axis has another direction then: on its surface, as near as that lets it be.
+    cosine = direction @ first / np.linalg.norm(direction) / np.linalg.norm(first)
+    assert np.arccos(cosine) < np.radians(20)
+    capsule = model.capsules[2]
+    along = np.linspace(0, 1, 10001)[:, None]
+    axis = capsule[:3] + along * (capsule[3:6] - capsule[:3])
+    distance = np.linalg.norm(plan.patches[3, 2] - axis, axis=1).min()
+    assert distance == pytest.approx(capsule[6], abs=1e-6)
+
+
+def test_what_counts_is_the_way_seen_from_the_palm() -> None:
+    # A palm that turns with the object sees no contact travel.
+    still, facing = turning(170), "facing: [{}, 0, {}]"
+    poses = ", ".join(
+        f"{{at: {k}, position: [0, 0, 0.3], {facing.format(np.cos(a), -np.sin(a))}}}"
+        for k, a in ((k, np.radians(42.5 * k)) for k in range(1, 5))
+    )
+    along = turning(170, f"position: [0, 0, 0.3], facing: [1, 0, 0], motion: [{poses}]")
+    pose = straight_path(still)
+    assert planned_regrasp(still, pose) is not None
+    assert planned_regrasp(along, pose) is None
+    assert np.degrees(FARTHEST) == pytest.approx(100)
+
+
+def lifted_model(model: Model) -> Model:
+    lifted = np.zeros((5, 3), bool)
+    lifted[2, 2] = True
+    patches = model.keyframe_patches.copy()
+    patches[3:, 2] = [0.4, 0, -0.5]
+    return replace(model, regrasp=Regrasp(lifted, patches))
+
+
+def test_a_contact_point_rests_where_it_lifts_and_touches() -> None:
+    model = lifted_model(turning(170))
+    assert model.regrasp is not None
+    points = sampled_points(model, model.regrasp.patches)
+    at = model.schedule.keyframe_samples
+    np.testing.assert_allclose(points[: at[2] + 1, 2], np.tile(model.patches[2], (at[2] + 1, 1)), atol=1e-12)
+    np.testing.assert_allclose(points[at[3] :, 2], np.tile([0.4, 0, -0.5], (len(points) - at[3], 1)), atol=1e-12)
+    assert np.linalg.norm(np.diff(points[at[2] : at[3] + 1, 2], axis=0), axis=1).min() > 1e-3
+    # Before it touches it has not slid: the sample one step earlier stands for the touch itself.
+    before = model.point_spline(2, -1.0) @ model.regrasp.patches[:, 2]
+    np.testing.assert_allclose(before[at[3]], [0.4, 0, -0.5], atol=1e-12)
+    others = model.point_spline(0)
+    np.testing.assert_array_equal(others, model.schedule.spline())
+
+
+def test_two_contacts_pass_as_a_pivot_only_while_one_lifts() -> None:
+    model = turning(170)
+    values = {
+        "pose": np.tile(straight_path(model)[0], (5, 1)),
+        "point": model.keyframe_patches.reshape(5, -1),
+        "activity": np.ones((5, 3)),
+    }
+    assert passes_gate(model, values)
+    values["activity"] = values["activity"].copy()
+    values["activity"][2, 2] = 0
+    assert not passes_gate(model, values)
+    assert passes_gate(model, values, pivots=True)
+    values["activity"][2] = 0
+    assert not passes_gate(model, values, pivots=True)
+
+
+def test_the_floating_motion_breaks_its_contact_and_holds_the_object_meanwhile() -> None:
+    model = turning(170)
+    weights = parse_task_weights()
+    floating = solve_floating(model, weights)
+    np.testing.assert_array_equal(floating.active[:, 2], [True, True, False, True, True])
+    assert floating.active[:, :2].all()
+    assert floating.model.regrasp is not None
+    assert floating.runs[-1][0] == "regrasp"
+    moved = np.linalg.norm(floating.point[3, 2] - floating.point[1, 2])
+    assert moved > 0.5
+    still = np.linalg.norm(np.diff(floating.point[3:, 2], axis=0), axis=1).max()
+    assert still < 0.2 * moved
+
+
+def parse_task_weights() -> dict[str, float]:
+    from casadi_hands.task.weights import Weights
+
+    return dict(Weights().floating)
