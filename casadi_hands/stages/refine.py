@@ -296,7 +296,7 @@ def eased_in(bearing: NDArray[np.bool_]) -> Array:
     if not len(idle):
         return np.ones(len(bearing))
     away = np.abs(np.arange(len(bearing))[:, None] - idle).min(axis=1)
-    return np.minimum(away / EASED, 1.0)
+    return np.asarray(np.minimum(away / EASED, 1.0))
 
 
 def longest_run(flags: NDArray[np.bool_]) -> int:

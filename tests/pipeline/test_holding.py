@@ -37,7 +37,7 @@ def still(friction: float, right: tuple[float, float, float] = (0, 1, 0)) -> tup
     active = np.ones((keyframes, 2), bool)
     values = {"pose": pose, "point": point.reshape(keyframes, -1), "activity": active.astype(float)}
     force = np.zeros((samples, 2, 3))
-    return model, Floating(pose, point, force, active, active.astype(float), 0.0, made_up_solution(values), ())
+    return model, Floating(pose, point, force, active, active.astype(float), 0.0, made_up_solution(values), (), model)
 
 
 @pytest.mark.parametrize("friction", [0.05, 0.2, 1.0])

@@ -43,6 +43,7 @@ def ball_target(squeeze: float = SQUEEZE) -> Target:
         threshold=0.1,
         solution=made_up_solution({}),
         runs=(),
+        model=model,
     )
     return target_of(model, floating)
 

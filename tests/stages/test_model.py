@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ruamel.yaml import YAML
+from scipy.integrate import quad
 from scipy.spatial.transform import Rotation, Slerp
 
 from casadi_hands.stages.floating import FloatingStage
@@ -103,10 +104,13 @@ def test_palm_moves_between_its_waypoints_and_then_stands() -> None:
     task, model = everything()
     (_, p0, r0), (t1, p1, r1) = task.palm.waypoints
     times = np.minimum(model.schedule.samples, t1)
-    expected = p0 + times[:, None] / t1 * (p1 - p0)
+    # The quintic that starts and ends at rest: the running integral of s²(1 - s)², to one.
+    s = times / t1
+    passed = np.array([quad(lambda x: 30 * x**2 * (1 - x) ** 2, 0, end)[0] for end in s])
+    expected = p0 + passed[:, None] * (p1 - p0)
     np.testing.assert_allclose(model.palm_position * 0.0475, expected, atol=1e-12)
     slerp = Slerp([0, t1], Rotation.from_matrix([r0, r1]))
-    assert (rotations(model.palm_quaternion) * slerp(times).inv()).magnitude().max() < 1e-7
+    assert (rotations(model.palm_quaternion) * slerp(passed * t1).inv()).magnitude().max() < 1e-7
 
 
 def test_goals_are_missed_by_no_more_than_the_task_allows() -> None:
