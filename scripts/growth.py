@@ -275,9 +275,11 @@ def draw(measured: dict[tuple[str, str], dict[int, Point]], file: Path) -> None:
         axes[row, 0].set_ylabel(label)
     for column, sweep in enumerate(sweeps):
         axes[-1, column].set_xlabel(sweep if sweep != "joints" else "joints a finger")
-    for each in axes.flat:
-        each.grid(True, which="both", alpha=0.3)
-    axes[0, 0].legend()
+        for each in axes[:, column]:
+            each.set_xticks(SWEEPS[sweep], [str(value) for value in SWEEPS[sweep]])
+            each.set_xticks([], minor=True)
+            each.grid(True, alpha=0.3)
+    axes[0, 0].legend(fontsize="small")
     figure.tight_layout()
     figure.savefig(file, dpi=110)
 
