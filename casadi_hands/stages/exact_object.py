@@ -107,6 +107,18 @@ def equilibrium() -> Kernel:
     return kernel
 
 
+def object_jerk() -> Kernel:
+    """How the object's acceleration changes over three knots.
+
+    Without it a motion that starts still reaches its full acceleration in one step, which joints cannot follow.
+    """
+    kernel = Kernel("object_jerk")
+    rates = [kernel.variable(f"rate{i}", 6) for i in range(3)]
+    step = kernel.parameter("step")
+    kernel.cost("object_jerk", (rates[2] - 2 * rates[1] + rates[0]) / step**2)
+    return kernel
+
+
 def force_change(contacts: int) -> Kernel:
     """Change of the contact forces from one knot to the next."""
     kernel = Kernel("force_change")

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 STANDARD_GRAVITY = 9.81  # m/s², sets the force unit where a task has none
 _WITHIN = 0.9 / math.sqrt(3)  # share of a limit that each of three coordinates may use
 # Half extents. Beyond these a gap is no contact, and slip would need friction on its cone, whatever a task accepts.
-_MOST_GAP, _MOST_SLIP = 2e-4, 4e-3
+_MOST_GAP, _MOST_SLIP = 2e-4, 2e-3
 _DIGITS = 12  # significant digits kept, so that scaled tasks give the very same numbers
 
 
@@ -226,7 +226,7 @@ def build_model(task: Task) -> Model:
             _WITHIN * math.radians(task.limits.goal_angle),
         ),
         gap_tolerance=round_off(min(0.2 * task.limits.gap / length, _MOST_GAP)),
-        slip_tolerance=round_off(min(0.4 * task.limits.slip / length, _MOST_SLIP)),
+        slip_tolerance=round_off(min(0.2 * task.limits.slip / length, _MOST_SLIP)),
         reference=reference,
         tool=None if not task.draws else round_off(np.asarray(task.tool) / length),
         perturbation_force=round_off(forces / units.force),

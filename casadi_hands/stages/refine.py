@@ -62,6 +62,7 @@ WEIGHTS = {
     "joint_acceleration": 1e-3,
     "joint_jerk": 3e-3,
     "object_acceleration": 1e-2,
+    "object_jerk": 1e-3,
     "stay_design": 0.02,
     "stay_path": 1.0,
     "goal": 300.0,

@@ -151,6 +151,8 @@ class RefineProblem:
         common = self._at(("reference", "step", "gravity", "inertial", "inertia", "inverse"))
         problem.bind(body.physics(), [*states, *wrenches], common, {"defect": (0, 0)})
         problem.bind(body.wrench(columns), [self.wrench, self.point, self.force], [], {"sum": (0, 0)})
+        inner = np.arange(self.knots - 2)
+        problem.bind(body.object_jerk(), [self.rate.take(inner + k) for k in range(3)], self._at(("step",), inner))
         still = [r.take([0, self.knots - 1]) for r in (self.pose, self.wrench)]
         problem.bind(body.equilibrium(), still, self._at(("reference", "gravity")), {"sum": (0, 0)})
         ends = [r.take(k) for k in (now, later) for r in (self.point, self.force)]

@@ -3,7 +3,8 @@
 The object moves by the velocities its physics gives it at the samples, the palm by velocities read off five samples,
 both cubic in between. The joints move as a smooth
 controller would move them: a twice differentiable cubic spline through the samples of every joint, one spline for each
-stretch in which the finger's contacts neither begin nor end, because there its speed may jump.
+stretch in which the finger's contacts neither begin nor end, because there its speed may jump. Where the object is at
+rest at the motion's first or last sample, so are the joints.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from scipy.spatial.transform import Rotation
 from casadi_hands.verify.dynamics import Shots, object_rotation
 from casadi_hands.verify.folder import Folder
 
+AT_REST = 1e-4
+"""m/s and rad/s."""
 DENSITY = 8
 """Dense times from a sample to the next: 12.5 ms apart at 0.1 s."""
 
@@ -55,7 +58,7 @@ def build_trajectory(folder: Folder, shots: Shots) -> Trajectory:
     interval = np.append(np.repeat(np.arange(count), DENSITY), count - 1)
     fraction = np.append(fraction, 1.0)
     time = samples[interval] + fraction * steps[interval]
-    joints, speeds = _joints(folder, time)
+    joints, speeds = _joints(folder, time, _rests(shots))
     base_rotation, base_position = _base(folder, interval, fraction)
     placed = place_links(folder, joints, base_rotation, base_position)
     placed["object"] = _object(folder, shots, interval, fraction)
@@ -98,7 +101,14 @@ def place_links(
     return {name: (rotation[name], position[name]) for name in frames}
 
 
-def _joints(folder: Folder, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _rests(shots: Shots) -> tuple[bool, bool]:
+    """Return whether the object is at rest at the first and at the last sample."""
+    first = np.concatenate([shots.launch_velocity[0], shots.launch_rate[0]])
+    last = np.concatenate([shots.arrival_velocity[-1], shots.arrival_rate[-1]])
+    return bool(np.linalg.norm(first) < AT_REST), bool(np.linalg.norm(last) < AT_REST)
+
+
+def _joints(folder: Folder, time: np.ndarray, rests: tuple[bool, bool]) -> tuple[np.ndarray, np.ndarray]:
     motion = folder.motion
     angles, speeds = np.empty((len(time), len(motion.joint_names))), np.empty((len(time), len(motion.joint_names)))
     for column, name in enumerate(motion.joint_names):
@@ -109,7 +119,10 @@ def _joints(folder: Folder, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         for first, last in pairwise(breaks):
             if first == last:
                 continue
-            spline = CubicSpline(motion.time[first : last + 1], motion.joint_angles[first : last + 1, column])
+            still = rests[0] and first == 0, rests[1] and last == breaks[-1]
+            ends = [(1, 0.0) if rest else "not-a-knot" for rest in still]
+            stretch = slice(first, last + 1)
+            spline = CubicSpline(motion.time[stretch], motion.joint_angles[stretch, column], bc_type=(ends[0], ends[1]))
             inside = (time >= motion.time[first]) & (time <= motion.time[last])
             angles[inside, column], speeds[inside, column] = spline(time[inside]), spline(time[inside], 1)
     return angles, speeds
