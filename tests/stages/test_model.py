@@ -131,13 +131,13 @@ def test_goals_are_missed_by_no_more_than_the_task_allows() -> None:
 
 
 def test_gaps_and_slips_are_a_part_of_the_task_s_limits_and_never_large() -> None:
-    # A fifth of a gap of 30 µm, two fifths of a slip of 0.2 mm; 2e-4 and 4e-3 half extents of 47.5 mm at most.
+    # A fifth of a gap of 30 µm and of a slip of 0.2 mm; 2e-4 and 2e-3 half extents of 47.5 mm at most.
     text = everything_text().replace("gap: 5e-05", "gap: 3e-05")
     model = build_model(parse_task(text))
     assert model.gap_tolerance * 0.0475 == pytest.approx(6e-6, rel=1e-9)
-    assert model.slip_tolerance * 0.0475 == pytest.approx(8e-5, rel=1e-9)
+    assert model.slip_tolerance * 0.0475 == pytest.approx(4e-5, rel=1e-9)
     lax = build_model(parse_task(text.replace("gap: 3e-05", "gap: 1.0").replace("slip: 0.0002", "slip: 1.0")))
-    assert (lax.gap_tolerance, lax.slip_tolerance) == (2e-4, 4e-3)
+    assert (lax.gap_tolerance, lax.slip_tolerance) == (2e-4, 2e-3)
 
 
 def test_perturbations_act_in_their_time_and_add_up() -> None:
