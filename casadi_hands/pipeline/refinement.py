@@ -68,6 +68,7 @@ _LIMITS = {  # by the constraint's kernel, without the finger's number, and name
     ),
     "apart.clear": _CLEAR,
     "apart_touching.clear": _CLEAR,
+    "apart_between.clear": _CLEAR,
     "fingers_apart.clear": _Limit("stay clear of each other", "length", _ROOM, ("penetration",)),
     "object_apart.palm": _Limit("stay clear of the palm", "length", "goals farther from the palm", ("penetration",)),
     "object_apart.ground": _Limit("stay above the ground", "length", "goals above the ground", ("penetration",)),

@@ -163,7 +163,9 @@ def rolling(joints: int, index: int) -> Kernel:
     return kernel
 
 
-def apart(joints: int, primitives: int, index: int, touched: int | None, grounded: bool) -> Kernel:
+def apart(
+    joints: int, primitives: int, index: int, touched: int | None, grounded: bool, between: bool = False
+) -> Kernel:
     """One finger clear of palm, ground, itself and the object at one time.
 
     Args:
@@ -172,8 +174,10 @@ def apart(joints: int, primitives: int, index: int, touched: int | None, grounde
         index: the contact.
         touched: the primitive the last link touches, left out; None where it must stay clear of all.
         grounded: whether there is a ground.
+        between: whether the time is between two knots; only names the kernel.
     """
-    kernel = Kernel(f"apart{index}" if touched is None else f"apart_touching{index}")
+    kind = "apart_touching" if touched is not None else "apart_between" if between else "apart"
+    kernel = Kernel(f"{kind}{index}")
     symbols = free_morphology(kernel, joints)
     pose, angles = kernel.variable("pose", 6), kernel.variable("angles", joints)
     reference, palm_position, palm_quaternion = (

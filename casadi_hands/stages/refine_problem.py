@@ -239,15 +239,29 @@ class RefineProblem:
         problem, structure, model = self.problem, self.structure, self.structure.model
         c, n = structure.contacts[i], structure.joints[i]
         touched = int(np.argmin(np.abs(model.primitives - model.capsules[c]).sum(axis=1)))
-        touching = structure.touching[:, i]
+        touching, idle = structure.touching[:, i], np.flatnonzero(~structure.active[:-1, i])
+        names = (
+            "reference",
+            "palm_position",
+            "palm_quaternion",
+            "radius",
+            "palm_radius",
+            "ground_height",
+            "primitives",
+        )
+
+        def bind(knots: NDArray[np.int64], rows: list[Rows], least: float, skipped: int | None, between: bool) -> None:
+            kernel = finger.apart(n, len(model.primitives), c, skipped, model.ground is not None, between)
+            rows = [*[r.constant(len(knots)) for r in self.shape[i]], *rows]
+            problem.bind(kernel, rows, self._at((f"frames{c}", *names), knots), {"clear": (least, np.inf)})
+
         for knots, skipped in ((np.flatnonzero(touching), touched), (np.flatnonzero(~touching), None)):
             if len(knots):
-                kernel = finger.apart(n, len(model.primitives), c, skipped, model.ground is not None)
-                rows = [r.constant(len(knots)) for r in self.shape[i]]
-                rows += [self.pose.take(knots), self.angles[i].take(knots)]
-                names = ("reference", "palm_position", "palm_quaternion", "radius", "palm_radius", "ground_height")
-                parameters = self._at((f"frames{c}", *names, "primitives"), knots)
-                problem.bind(kernel, rows, parameters, {"clear": (CLEARANCE, np.inf)})
+                bind(knots, [self.pose.take(knots), self.angles[i].take(knots)], CLEARANCE, skipped, between=False)
+        if len(idle):  # a lifted finger is quick, and must not cut through the object's edge between two knots
+            halves = np.zeros((len(idle), self.knots))
+            halves[np.arange(len(idle)), idle] = halves[np.arange(len(idle)), idle + 1] = 0.5
+            bind(idle, [self.pose.combine(halves), self.angles[i].combine(halves)], 0.0, None, between=True)
 
     def _bind_shape(self, i: int) -> None:
         """A finger's morphology, and its joints' motion: mirrored at both ends, so that it starts and ends at rest."""

@@ -1,0 +1,82 @@
+"""Tasks of the thesis, solved whole; what its figures show must be in the motion that is written."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from casadi_hands import Design, load_task, solve
+from casadi_hands.design import Motion
+from casadi_hands.verify import replay
+
+PROBLEMS = Path(__file__).parent.parent / "problems"
+Array = np.ndarray
+
+
+def certified(name: str, folder: Path) -> Motion:
+    """The motion of a task solved with its own seed; it is certified and its replay does not drop the object."""
+    design = solve(load_task(PROBLEMS / f"{name}.yaml"), out=folder)
+    assert design.status == "certified", design.reason
+    assert not replay(folder).dropped
+    motion = Design.load(folder).motion
+    assert motion is not None
+    return motion
+
+
+@pytest.mark.slow
+def test_the_top_finger_lets_go_of_the_capsule_and_takes_its_other_half(tmp_path: Path) -> None:
+    breaks_and_takes_anew(certified("half_turn", tmp_path))
+
+
+def breaks_and_takes_anew(motion: Motion) -> None:
+    top = motion.contact_names.index("top")
+    changes = np.flatnonzero(np.diff(motion.contact_active[:, top].astype(int)))
+    assert [int(motion.contact_active[k + 1, top]) for k in changes] == [0, 1]
+    lifted, touched = changes + 1
+    before, after = motion.contact_point_object[lifted - 1, top], motion.contact_point_object[touched, top]
+    assert before[2] > 0.005
+    assert after[2] < -0.003
+    assert motion.contact_point_object[-1, top, 2] < -0.005
+    others = [c for c in range(3) if c != top]
+    assert motion.contact_active[:, others].all()
+
+
+@pytest.mark.slow
+def test_the_table_carries_the_capsule_that_is_turned_on_it(tmp_path: Path) -> None:
+    the_ground_carries(certified("tabletop_rotation_overhead", tmp_path))
+
+
+def the_ground_carries(motion: Motion) -> None:
+    ground = motion.contact_link.index("ground")
+    upward = motion.contact_force[:, ground, 2]
+    assert upward.min() >= 0
+    assert upward.mean() > 0.1 * 0.15 * 9.81
+    turn = Rotation.from_quat(motion.object_orientation[[0, len(motion.time) // 2]], scalar_first=True)
+    assert np.degrees((turn[0].inv() * turn[1]).magnitude()) == pytest.approx(90, abs=0.6)
+    # The capsule lies on the table all the time: its axis is level, a radius above it.
+    axes = Rotation.from_quat(motion.object_orientation, scalar_first=True).apply([1, 0, 0])
+    assert np.abs(axes[:, 2]).max() < 0.003
+    assert np.abs(motion.object_position[:, 2] - 0.02).max() < 1e-4
+
+
+@pytest.mark.slow
+def test_the_pen_draws_its_triangle(tmp_path: Path) -> None:
+    assert farthest_from_the_triangle(certified("draw_triangle", tmp_path)) < 0.001
+
+
+def farthest_from_the_triangle(motion: Motion) -> float:
+    turns = Rotation.from_quat(motion.object_orientation, scalar_first=True)
+    tip = motion.object_position + turns.apply([0, 0, -0.06])
+    corners = np.array([[0, 0, 0], [0.03, 0, 0], [0.015, 0.026, 0], [0, 0, 0]])
+    distances = [[_from_segment(point, *side) for side in pairwise(corners)] for point in tip]
+    return float(np.min(distances, axis=1).max())
+
+
+def _from_segment(point: Array, start: Array, end: Array) -> float:
+    along = end - start
+    fraction = np.clip((point - start) @ along / (along @ along), 0, 1)
+    return float(np.linalg.norm(point - start - fraction * along))
