@@ -46,32 +46,40 @@ class Certifier:
         self.judge, self.jobs = judge, jobs
 
     def run(self, found: Found) -> Design:
-        """Refine the best hand, the next best, then hands with one more joint where those failed."""
-        best: tuple[int, Design] | None = None
+        """Refine the best hand, the next best, then hands with one more joint where those failed.
+
+        A certified hand whose replays drop the object makes way for the next best of its structure that does better.
+        """
+        best: tuple[tuple[int, int], Design] | None = None
         if found.farthest > OUT_OF_REACH:
             run_whole_hand(self.record, self.model, self.floating, found.candidates[0])
             return self.judge.judge(self.record.design, found.short)
         while True:
             failing: set[str] = set()
             for candidate in found.candidates[:HANDS_REFINED]:
-                judged, refined = self._certify(candidate, found.short)
-                if judged.status == "certified":
+                judged, refined, drops = self._certify(candidate, found.short)
+                if judged.status == "certified" and drops <= DROPS:
                     return judged
-                self.record.say("refine", f"not certified: {judged.reason}")
+                if judged.status != "certified":
+                    self.record.say("refine", f"not certified: {judged.reason}")
                 missed = sum(not figure["holds"] for figure in judged.certificate.values())
-                if best is None or missed < best[0]:
-                    best = (missed, judged)
+                if best is None or (missed, drops) < best[0]:
+                    best = ((missed, drops), judged)
                 failing |= failing_fingers(self.model, refined)
                 if refined.slips_hopelessly:
                     break  # a structure that must slip will do so in any of its hands
             least = self._more_joints(found, failing)
-            if least is None and best is not None:
+            if best is not None and (best[1].status == "certified" or least is None):
                 return best[1]
             self.record.say("synthesis", f"another joint for {', '.join(sorted(failing)) or 'the fingers with fewest'}")
             found = run_search(self.record, self.model, self.search, least)
 
-    def _certify(self, candidate: Candidate, short: tuple[Reason, ...]) -> tuple[Design, Refined]:
-        """Refine one hand with an ample margin, with a small one where that fails, with more where a replay drops."""
+    def _certify(self, candidate: Candidate, short: tuple[Reason, ...]) -> tuple[Design, Refined, int]:
+        """Refine one hand with an ample margin, with a small one where that fails, with more where a replay drops.
+
+        Returns:
+            the design, its refinement, and how many of its replays drop the object.
+        """
         whole = run_whole_hand(self.record, self.model, self.floating, candidate)
         planned = self.record.design
         with self.record.stage("refine", "the same motion with exact physics, rolling contacts and clearance"):
@@ -88,9 +96,10 @@ class Certifier:
             with self.record.stage("refine", text):
                 firmer = self._attempt(stage, whole, FIRM)
             again = self._judged(firmer, short, planned)
-            if again.status == "certified" and self._drops(again) < drops:
-                return again, firmer
-        return judged, refined
+            fewer = self._drops(again) if again.status == "certified" else drops
+            if fewer < drops:
+                return again, firmer, fewer
+        return judged, refined, drops
 
     def _attempt(self, stage: RefineStage, whole: WholeHand, margin: Margin) -> Refined:
         """Refine with one margin, and record its solves whether they serve or not."""

@@ -40,6 +40,7 @@ class Loop(Certifier):
         super().__init__(Record(task, None, lambda _: None), build_model(task), floating, search, judge, 1)
         self.verdicts, self.tried = verdicts, []  # type: ignore[var-annotated]
         self.least: list[dict[int, int]] = []
+        self.dropped = [0] * len(verdicts)
         monkeypatch.setattr(certify, "run_search", self._search)
         monkeypatch.setattr(certify, "run_whole_hand", lambda *_: self.tried.append("whole hand"))
 
@@ -47,7 +48,7 @@ class Loop(Certifier):
         self.least.append(arguments[-1])
         return found((arguments[-1][0], arguments[-1][1]))
 
-    def _certify(self, candidate: Candidate, short: Any) -> tuple[Design, Any]:
+    def _certify(self, candidate: Candidate, short: Any) -> tuple[Design, Any, int]:
         missed, worst, slips = self.verdicts[len(self.tried)]
         self.tried.append(candidate.joints)
         refined = SimpleNamespace(slips_hopelessly=slips, slips={"left": 1.0, "right": 0.1}, worst=(worst, 1.0))
@@ -55,13 +56,29 @@ class Loop(Certifier):
         certificate = {str(i): {"holds": i >= missed} for i in range(9)}
         status = "failed" if missed else "certified"
         words = f"attempt {len(self.tried)}"
-        return replace(self.record.design, status=status, reason=words, certificate=certificate), refined
+        return (
+            replace(self.record.design, status=status, reason=words, certificate=certificate),
+            refined,
+            self.dropped[len(self.tried) - 1],
+        )
 
 
 def test_the_first_certified_hand_is_returned(monkeypatch: pytest.MonkeyPatch) -> None:
     loop = Loop(monkeypatch, [(2, "physics.defect", False), (0, "", False)], max_joints=3)
     assert loop.run(found((1, 1), (1, 1), (1, 1))).status == "certified"
     assert loop.tried == [(1, 1), (1, 1)]
+
+
+def test_a_certified_hand_that_drops_the_object_makes_way_for_one_that_drops_it_less(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for dropped, best, tried in (([12, 0], 2, 2), ([12, 5], 2, 2), ([5, 12], 1, 2), ([1, 0], 1, 1)):
+        loop = Loop(monkeypatch, [(0, "", False), (0, "", False)], max_joints=3)
+        loop.dropped = dropped
+        assert loop.run(found((1, 1), (1, 1), (1, 1))).reason == f"attempt {best}"
+        assert len(loop.tried) == tried
+    # Another structure is not tried: it would be no better held between the same contacts.
+    assert loop.least == []
 
 
 def test_the_finger_that_failed_gets_a_joint_until_none_may(monkeypatch: pytest.MonkeyPatch) -> None:
