@@ -163,15 +163,17 @@ class Simulation:
 
     def _support(self, share: float) -> tuple[np.ndarray, np.ndarray]:
         """Return a share of the spring force and torque that hold the object at its start."""
-        mass, inertia = self.model.body_mass[self._object], float(np.max(self.model.body_inertia[self._object]))
-        position, quaternion = self.object_pose()
+        mass, (position, quaternion) = self.model.body_mass[self._object], self.object_pose()
         turn = Rotation.from_quat(quaternion, scalar_first=True)
+        # About every axis by its own inertia: a thin object would be shaken by what serves its length.
+        axes = (turn * Rotation.from_quat(self.model.body_iquat[self._object], scalar_first=True)).as_matrix()
+        inertia = axes @ np.diag(self.model.body_inertia[self._object]) @ axes.T
         velocity = self.data.qvel[self._twist : self._twist + 3]
         rate = turn.apply(self.data.qvel[self._twist + 3 : self._twist + 6])
         off = position - self._home[0]
         turned = (turn * self._home[1].inv()).as_rotvec()
         force = mass * (-(SUPPORT**2) * off - 2 * SUPPORT * velocity)
-        torque = inertia * (-(SUPPORT**2) * turned - 2 * SUPPORT * rate)
+        torque = inertia @ (-(SUPPORT**2) * turned - 2 * SUPPORT * rate)
         return share * force, share * torque
 
     def play(self, plan: Plan, i: int, push: np.ndarray, observer: Observer | None) -> None:

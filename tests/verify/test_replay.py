@@ -5,16 +5,19 @@ from __future__ import annotations
 import sys
 from dataclasses import asdict
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from fixture import Scene, carried
+from scipy.spatial.transform import Rotation
 
 from casadi_hands.errors import DesignError, HandsError
 from casadi_hands.export.mjcf import scene_mjcf
 from casadi_hands.verify import Perturbation, audit, replay, replay_many
 from casadi_hands.verify.folder import read_folder
 from casadi_hands.verify.perturb import draw_perturbation
+from casadi_hands.verify.simulation import SUPPORT, Simulation
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -133,3 +136,21 @@ def test_without_imageio_the_message_says_what_to_install(folder: Path, monkeypa
     monkeypatch.setitem(sys.modules, "imageio", None)
     with pytest.raises(HandsError, match="imageio"):
         film(folder, folder / "film.mp4")
+
+
+def test_the_support_damps_a_thin_object_about_every_axis_by_its_own_inertia() -> None:
+    inertia, frame = np.array([4e-6, 4e-6, 5e-8]), Rotation.from_rotvec([0.3, -0.5, 0.2])
+    turn = Rotation.from_rotvec([0.4, 0.1, -0.9])
+    spin = turn * frame  # the long axis is the inertial frame's third
+    rate_in_body = 3.0 * frame.as_matrix()[:, 2]
+    state = SimpleNamespace(
+        model=SimpleNamespace(body_mass=[0.02], body_inertia=[inertia], body_iquat=[frame.as_quat(scalar_first=True)]),
+        data=SimpleNamespace(qvel=np.concatenate([np.zeros(3), rate_in_body])),
+        object_pose=lambda: (np.zeros(3), turn.as_quat(scalar_first=True)),
+        _object=0,
+        _twist=0,
+        _home=(np.zeros(3), turn),
+    )
+    force, torque = Simulation._support(state, 0.5)  # type: ignore[arg-type]
+    np.testing.assert_allclose(force, 0, atol=1e-15)
+    np.testing.assert_allclose(torque, -0.5 * 5e-8 * 2 * SUPPORT * 3.0 * spin.as_matrix()[:, 2], rtol=1e-9)
