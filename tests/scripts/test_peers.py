@@ -74,7 +74,9 @@ def test_all_find_the_minimum_within_bounds_from_the_same_start(name: str, posed
     for attempt in run.attempts:
         assert attempt.objective == pytest.approx(expected, rel=1e-5)
         assert attempt.trace[0][1] == pytest.approx(rosen(START), rel=1e-6)
-        assert attempt.trace[-1] == (pytest.approx(attempt.seconds, rel=0.5), attempt.objective)
+        # No more of the clock: how long the rest of a solve takes is up to the machine.
+        assert 0 < attempt.trace[-1][0] <= attempt.seconds * (1 + 1e-9)
+        assert attempt.trace[-1][1] == attempt.objective
         assert (np.diff([objective for _, objective in attempt.trace]) <= 0).all()
         assert 5 < attempt.iterations < 500
 
