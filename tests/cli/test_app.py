@@ -386,7 +386,6 @@ def test_replay_prints_errors_and_drops(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_replay_plays_a_folder(scene: Scene, tmp_path: Path) -> None:
-    pytest.importorskip("mujoco")
     folder = scene.write(tmp_path / "good")
     (folder / "scene.xml").write_text(scene_mjcf(scene.task, scene.hand, scene.motion))
     found = run("replay", folder)

@@ -27,9 +27,6 @@ from casadi_hands.stages.kernels import dynamics
 
 Array = np.ndarray
 ROOT = Path(__file__).parents[2]
-needs_compiler = pytest.mark.skipif(
-    not any(shutil.which(name) for name in ("cc", "gcc", "clang")), reason="no C compiler here"
-)
 
 
 class Compiler:
@@ -107,7 +104,6 @@ def kernels() -> list[Kernel]:
     ]
 
 
-@needs_compiler
 @pytest.mark.parametrize("kernel", kernels(), ids=lambda kernel: kernel.name)
 def test_machine_code_gives_the_very_numbers_of_the_interpreter(
     kernel: Kernel, monkeypatch: pytest.MonkeyPatch
@@ -128,7 +124,6 @@ def test_machine_code_gives_the_very_numbers_of_the_interpreter(
                 np.testing.assert_array_equal(np.asarray(a), np.asarray(b))
 
 
-@needs_compiler
 def test_a_kernel_is_compiled_once(counting: Compiler) -> None:
     assert is_compiled(compiled("wave", wave()))
     assert counting.count == 1
@@ -144,7 +139,6 @@ def test_a_kernel_is_compiled_once(counting: Compiler) -> None:
     np.testing.assert_allclose(numbers(compiled("wave", wave()), x), np.sin(x) * np.linalg.norm(x))
 
 
-@needs_compiler
 def test_nothing_but_libraries_stays_in_the_cache(cache: Path) -> None:
     compiled("wave", wave())
     assert suffixes(cache) == [".sha256", ".so"]
@@ -182,7 +176,6 @@ def test_a_compiler_that_fails_leaves_the_interpreter(
     assert not list(cache.iterdir())
 
 
-@needs_compiler
 def test_the_compilers_own_words_are_passed_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -256,7 +249,6 @@ DAMAGES: dict[str, Callable[[Path], object]] = {
 }
 
 
-@needs_compiler
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_a_damaged_library_is_compiled_again(damage: str, cache: Path) -> None:
     compiled("wave", wave())
@@ -274,7 +266,6 @@ def test_a_damaged_library_is_compiled_again(damage: str, cache: Path) -> None:
     assert library.with_suffix(".sha256").read_text() == f"{digest}  {library.name}\n"
 
 
-@needs_compiler
 def test_a_record_without_its_library_is_no_damage(cache: Path, caplog: pytest.LogCaptureFixture) -> None:
     # What a process leaves that ends between its two steps.
     cache.mkdir()
@@ -285,7 +276,6 @@ def test_a_record_without_its_library_is_no_damage(cache: Path, caplog: pytest.L
     assert not caplog.records
 
 
-@needs_compiler
 def test_a_process_killed_while_it_builds_leaves_nothing_that_hurts(counting: Compiler, cache: Path) -> None:
     counting.call_itself("one", 30)
     killed = start()
@@ -329,7 +319,6 @@ def test_the_lock_is_let_go_when_the_build_fails(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("place", ["file/cache", "/proc/cache", "/proc/self/cache"])
-@needs_compiler
 def test_a_cache_that_cannot_be_made_leaves_the_interpreter(
     place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -343,7 +332,6 @@ def test_a_cache_that_cannot_be_made_leaves_the_interpreter(
     assert place in message
 
 
-@needs_compiler
 def test_without_a_home_kernels_are_interpreted(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -366,7 +354,6 @@ def mounted(options: str, then: str) -> tuple[str, ...]:
     return (*before, f'{mount} && {then} && exec "$@"', "sh")
 
 
-@needs_compiler
 @pytest.mark.parametrize("room", ["4k", "12k"], ids=["for no C", "for the C alone"])
 def test_a_full_cache_leaves_the_interpreter(room: str) -> None:
     full = start(before=mounted(f"size={room}", "true"))
@@ -377,7 +364,6 @@ def test_a_full_cache_leaves_the_interpreter(room: str) -> None:
     assert "No space left on device" in log
 
 
-@needs_compiler
 def test_a_limit_on_the_size_of_files_leaves_the_interpreter(cache: Path) -> None:
     limited = start("import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (2048, 2048))" + PROGRAM)
     words, log = limited.communicate(timeout=60)
@@ -388,7 +374,6 @@ def test_a_limit_on_the_size_of_files_leaves_the_interpreter(cache: Path) -> Non
     assert not list(cache.iterdir())
 
 
-@needs_compiler
 def test_a_read_only_cache_serves_what_it_has(cache: Path, tmp_path: Path) -> None:
     compiled("wave", wave())
     cache.rename(tmp_path / "full")
@@ -401,14 +386,12 @@ def test_a_read_only_cache_serves_what_it_has(cache: Path, tmp_path: Path) -> No
     assert log.count("\n") == 1
 
 
-@needs_compiler
 def test_a_cache_named_by_a_relative_path_serves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("CASADI_HANDS_CACHE", ".")
     assert is_compiled(compiled("wave", wave()))
 
 
-@needs_compiler
 def test_another_compiler_casadi_or_machine_has_its_own_libraries(
     counting: Compiler, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -447,7 +430,6 @@ def test_where_the_cache_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert not cache_folder().exists()
 
 
-@needs_compiler
 def test_processes_that_want_the_same_kernel_at_once_compile_it_once(counting: Compiler, cache: Path) -> None:
     running = [start() for _ in range(3)]
     words = [process.communicate(timeout=120)[0] for process in running]

@@ -7,6 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from types import SimpleNamespace
 
+import mujoco
 import numpy as np
 import pytest
 from fixture import Scene, carried
@@ -18,8 +19,6 @@ from casadi_hands.verify import Perturbation, audit, replay, replay_many
 from casadi_hands.verify.folder import read_folder
 from casadi_hands.verify.perturb import draw_perturbation
 from casadi_hands.verify.simulation import SUPPORT, Simulation
-
-mujoco = pytest.importorskip("mujoco")
 
 
 def _write(scene: Scene, directory: Path) -> Path:

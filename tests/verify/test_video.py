@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from types import SimpleNamespace
 
+import mujoco
 import numpy as np
 import pytest
 from fixture import carried
@@ -67,7 +68,6 @@ def test_without_imageio_the_message_is_one_line(folder: Path, tmp_path: Path, m
 
 
 def test_a_backend_that_mujoco_cannot_load_is_named_in_one_line(folder: Path) -> None:
-    pytest.importorskip("mujoco")
     # MuJoCo reads MUJOCO_GL once, as it is imported.
     environment = {**os.environ, "MUJOCO_GL": "abacus", "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
@@ -78,7 +78,6 @@ def test_a_backend_that_mujoco_cannot_load_is_named_in_one_line(folder: Path) ->
 
 
 def test_what_cannot_be_drawn_or_written_is_one_line(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    mujoco = pytest.importorskip("mujoco")
 
     def refuse(*_: object, **__: object) -> None:
         raise OSError("no such\nplace")
@@ -93,7 +92,6 @@ def test_what_cannot_be_drawn_or_written_is_one_line(folder: Path, monkeypatch: 
 
 
 def test_a_film_shows_the_whole_replay_and_something_that_moves(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    mujoco = pytest.importorskip("mujoco")
     try:
         mujoco.Renderer(mujoco.MjModel.from_xml_string("<mujoco/>"), 8, 8).close()
     except Exception as error:  # whatever a missing OpenGL raises
