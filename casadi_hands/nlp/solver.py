@@ -122,15 +122,11 @@ class Solver:
             KeyError: a name that is not in the problem, or a parameter left out.
             KeyboardInterrupt: the solve was interrupted.
         """
-        problem = self.problem
-        missing = [name for name in problem.parameters.names() if name not in parameters]
-        if missing:
-            raise KeyError(f"parameters without a value: {', '.join(missing)}")
+        problem, p = self.problem, self._parameters(parameters)
         solver = self._solver(options or Options())
         lbx = problem.variables.pack(lower or {}, problem.lower)
         ubx = problem.variables.pack(upper or {}, problem.upper)
         x0 = np.clip(problem.variables.pack(start, np.zeros(problem.variables.size)), lbx, ubx)
-        p = problem.parameters.pack(parameters, np.zeros(problem.parameters.size))
         arguments: dict[str, Any] = {"x0": x0, "p": p, "lbx": lbx, "ubx": ubx}
         lbg, ubg = problem.constraint_lower.copy(), problem.constraint_upper.copy()
         for name, (low, high) in (constraints or {}).items():
@@ -147,11 +143,30 @@ class Solver:
         return self._solution(answer, p, (lbg, ubg), solver.stats(), seconds)
 
     def evaluate(self, values: Mapping[str, ArrayLike], parameters: Mapping[str, ArrayLike]) -> dict[str, float]:
-        """The weighted value of every term at given variables."""
+        """The weighted value of every term at given variables; those left out are zero.
+
+        Args:
+            values: variable -> value.
+            parameters: parameter -> value, all of them.
+
+        Raises:
+            KeyError: as `solve`.
+        """
         x = self.problem.variables.pack(values, np.zeros(self.problem.variables.size))
-        p = self.problem.parameters.pack(parameters, np.zeros(self.problem.parameters.size))
-        terms = np.asarray(self.functions["terms"](x, p)).reshape(-1)
+        terms = np.asarray(self.functions["terms"](x, self._parameters(parameters))).reshape(-1)
         return dict(zip(self.problem.terms, terms.tolist(), strict=True))
+
+    def _parameters(self, given: Mapping[str, ArrayLike]) -> Vector:
+        """All parameters in their order.
+
+        Raises:
+            KeyError: one that has no value, or a name that is not in the problem.
+        """
+        layout = self.problem.parameters
+        missing = [name for name in layout.names() if name not in given]
+        if missing:
+            raise KeyError(f"parameters without a value: {', '.join(missing)}")
+        return layout.pack(given, np.zeros(layout.size))
 
     def _solution(
         self, answer: dict[str, Any], p: Vector, bounds: tuple[Vector, Vector], stats: dict[str, Any], seconds: float

@@ -103,6 +103,8 @@ def test_a_missing_parameter_and_unknown_names_are_named() -> None:
     solver = Solver(chain())
     with pytest.raises(KeyError, match=r"parameters without a value: targets, weight\.smooth"):
         solver.solve({}, {"weight.near": 1.0})
+    with pytest.raises(KeyError, match=r"parameters without a value: targets, weight\.smooth"):
+        solver.evaluate({}, {"weight.near": 1.0})
     with pytest.raises(KeyError, match="'pionts' is not one of points"):
         solver.solve({"pionts": 0.0}, {"targets": TARGETS, **WEIGHTS})
     with pytest.raises(KeyError, match="'points' is not one of targets"):
