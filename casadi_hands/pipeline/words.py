@@ -9,27 +9,14 @@ import numpy as np
 from casadi_hands.design import Design, Hand
 from casadi_hands.pipeline.holding import HELD, MOST_GRIP, grips, least_friction, least_torque
 from casadi_hands.reasons import Reason
-from casadi_hands.search.shortcoming import moment
+from casadi_hands.search.shortcoming import WITHOUT_CONTACT, moment
 from casadi_hands.stages.floating import Floating
 from casadi_hands.stages.model import Model
 from casadi_hands.verify import Audit
 from casadi_hands.verify.report import Figure, show
 
-_GRIP = frozenset(  # figures that follow where the hand cannot grip, and a refinement in vain ends anywhere
-    (
-        "residual",
-        "residual_between",
-        "friction_excess",
-        "pull",
-        "gap_between",
-        "slip",
-        "unsupplied_force",
-        "disturbance_radius",
-        "torque",
-        "gap",
-        "penetration",
-    )
-)
+# Figures that follow where the hand cannot grip: a refinement in vain ends anywhere.
+_GRIP = WITHOUT_CONTACT | {"torque"}
 
 
 def friction_reason(model: Model, floating: Floating) -> Reason | None:

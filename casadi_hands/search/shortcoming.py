@@ -14,7 +14,7 @@ from casadi_hands.stages.target import Target
 
 Array = NDArray[np.float64]
 # Figures that follow where a finger does not hold its contact, and where it is not even there.
-_NO_FORCE = frozenset(
+WITHOUT_FORCE = frozenset(
     (
         "residual",
         "residual_between",
@@ -26,7 +26,7 @@ _NO_FORCE = frozenset(
         "disturbance_radius",
     )
 )
-_NO_CONTACT = _NO_FORCE | {"gap", "penetration"}
+WITHOUT_CONTACT = WITHOUT_FORCE | {"gap", "penetration"}
 
 
 def beyond_reach(target: Target, contact: int, joints: int) -> Array:
@@ -62,7 +62,7 @@ def shortcoming(target: Target, hand: Synthesised, contact: int, score: float) -
             f"{who} cannot reach {when if k in goals else f'its contact at {when}'} with {joints_of(finger.joints)}: "
             f"its contact is {1e3 * beyond[k] * length:.1f} mm beyond links of at most {longest:.1f} mm each"
         )
-        return Reason(what, "longer links (hand.link_length), a palm nearer by or a nearer goal", _NO_CONTACT, True)
+        return Reason(what, "longer links (hand.link_length), a palm nearer by or a nearer goal", WITHOUT_CONTACT, True)
     points, _ = contact_kinematics(finger, target.string_of(contact), target.link_radius)
     squares = ((points - target.points[:, contact]) ** 2).sum(axis=1)[target.active[:, contact]]
     missing = TIP_WEIGHT * float(squares.mean())
@@ -72,12 +72,14 @@ def shortcoming(target: Target, hand: Synthesised, contact: int, score: float) -
             f"{who} misses its contact by {1e3 * miss * length:.1f} mm at {moment(target.model.schedule, time)} "
             f"with {joints_of(finger.joints)}"
         )
-        return Reason(what, "more joints (search.max_joints), more trials or a contact nearer the palm", _NO_CONTACT)
+        return Reason(
+            what, "more joints (search.max_joints), more trials or a contact nearer the palm", WITHOUT_CONTACT
+        )
     what = (
         f"{who} cannot press as its contact needs with {joints_of(finger.joints)}: no joint supplies "
         f"{score - missing:.2f} weights of the force, on average"
     )
-    return Reason(what, "more joints (search.max_joints) or a contact that is pressed from another side", _NO_FORCE)
+    return Reason(what, "more joints (search.max_joints) or a contact that is pressed from another side", WITHOUT_FORCE)
 
 
 def moment(schedule: Schedule, time: float) -> str:
