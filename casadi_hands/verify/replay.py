@@ -68,7 +68,7 @@ def replay(directory: str | Path, perturbation: Perturbation | None = None, obse
 
     Raises:
         DesignError: the folder is incomplete, or ``scene.xml`` is not of this hand.
-        HandsError: MuJoCo is not installed.
+        HandsError: MuJoCo is not installed or cannot be loaded.
     """
     folder = read_folder(directory)
     perturbation = perturbation or Perturbation()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,29 @@ SUPPORT = 60.0
 
 Observer = Callable[[Any, Any], None]
 """Called with MuJoCo's model and data after every step."""
+
+
+def load_mujoco() -> Any:
+    """The module ``mujoco``.
+
+    Raises:
+        HandsError: it is not installed, or cannot be loaded; the message says which.
+    """
+    try:
+        return import_module("mujoco")
+    # With itself it loads the OpenGL that MUJOCO_GL names, which raises whatever it likes.
+    except Exception as error:
+        if isinstance(error, ModuleNotFoundError) and error.name == "mujoco":
+            raise HandsError("replay needs MuJoCo: pip install 'casadi-hands[sim]'") from None
+        raise HandsError(
+            f"MuJoCo cannot be loaded ({one_line(error)}); try MUJOCO_GL=egl or MUJOCO_GL=osmesa, or MUJOCO_GL=disable "
+            "without a video"
+        ) from None
+
+
+def one_line(error: Exception) -> str:
+    """An error's words without line breaks."""
+    return " ".join(str(error).split())
 
 
 class Plan:
@@ -81,13 +105,9 @@ class Simulation:
 
         Raises:
             DesignError: the scene is missing, unreadable, or not of this hand.
-            HandsError: MuJoCo is not installed.
+            HandsError: MuJoCo is not installed or cannot be loaded.
         """
-        try:
-            import mujoco
-        except ImportError:
-            raise HandsError("replay needs MuJoCo: pip install 'casadi-hands[sim]'") from None
-        self._mujoco = mujoco
+        self._mujoco = mujoco = load_mujoco()
         file = folder.path / "scene.xml"
         try:
             self.model = mujoco.MjModel.from_xml_path(str(file))

@@ -12,6 +12,7 @@ from casadi_hands.errors import HandsError
 from casadi_hands.verify.folder import Folder, read_folder
 from casadi_hands.verify.perturb import Perturbation
 from casadi_hands.verify.replay import Replay, replay
+from casadi_hands.verify.simulation import load_mujoco, one_line
 
 FRAMES = 30
 """Per second."""
@@ -24,11 +25,11 @@ def film(directory: str | Path, file: str | Path, perturbation: Perturbation | N
     """Replay a result folder once and write what it looks like to a video or GIF file.
 
     Raises:
-        HandsError: MuJoCo cannot draw here, it or imageio is not installed, or the file cannot be written; the
-            message says which.
+        HandsError: MuJoCo cannot be loaded or draw here, it or imageio is not installed, or the file cannot be
+            written; the message says which.
         DesignError: as `replay`.
     """
-    imageio, mujoco = _imageio(), _mujoco()
+    imageio, mujoco = _imageio(), load_mujoco()
     camera = _Camera(mujoco, read_folder(directory))
     try:
         outcome = replay(directory, perturbation, camera)
@@ -38,7 +39,7 @@ def film(directory: str | Path, file: str | Path, perturbation: Perturbation | N
         imageio.mimsave(file, camera.frames, fps=FRAMES)
     # imageio passes on what its plugins raise: a LookupError for a still picture's format, say.
     except (OSError, ValueError, LookupError) as error:
-        raise HandsError(f"{file}: cannot be written as a video: {_one_line(error)}") from None
+        raise HandsError(f"{file}: cannot be written as a video: {one_line(error)}") from None
     return outcome
 
 
@@ -78,31 +79,11 @@ def _imageio() -> Any:
         raise HandsError("a video needs imageio: pip install 'casadi-hands[video]'; replay works without") from None
 
 
-def _mujoco() -> Any:
-    try:
-        return import_module("mujoco")
-    except ModuleNotFoundError as error:
-        if error.name != "mujoco":
-            raise _cannot_draw(error) from None
-        raise HandsError("a video needs MuJoCo: pip install 'casadi-hands[video]'") from None
-    # MuJoCo loads the OpenGL that MUJOCO_GL names as it is imported.
-    except Exception as error:
-        raise _cannot_draw(error) from None
-
-
 def _renderer(mujoco: Any, model: Any) -> Any:
     try:
         return mujoco.Renderer(model, *SIZE)
     # What a missing OpenGL raises depends on the platform and on MuJoCo's backend.
     except Exception as error:
-        raise _cannot_draw(error) from None
-
-
-def _cannot_draw(error: Exception) -> HandsError:
-    return HandsError(
-        f"MuJoCo cannot draw here ({_one_line(error)}); try MUJOCO_GL=egl or MUJOCO_GL=osmesa; replay works without"
-    )
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())
+        raise HandsError(
+            f"MuJoCo cannot draw here ({one_line(error)}); try MUJOCO_GL=egl or MUJOCO_GL=osmesa; replay works without"
+        ) from None

@@ -23,12 +23,14 @@ PROGRAM = """
 import sys
 from types import SimpleNamespace
 from casadi_hands.errors import HandsError
+from casadi_hands.verify import replay
 from casadi_hands.verify.video import film
 sys.modules["imageio"] = SimpleNamespace()
-try:
-    film(sys.argv[1], "film.gif")
-except HandsError as error:
-    print(error)
+for play in (replay, lambda folder: film(folder, "film.gif")):
+    try:
+        play(sys.argv[1])
+    except HandsError as error:
+        print(error)
 """
 
 
@@ -58,7 +60,7 @@ def test_without_mujoco_the_message_is_one_line(folder: Path, tmp_path: Path, mo
     monkeypatch.setitem(sys.modules, "imageio", SimpleNamespace())
     with pytest.raises(HandsError) as raised:
         film(folder, tmp_path / "film.gif")
-    assert str(raised.value) == "a video needs MuJoCo: pip install 'casadi-hands[video]'"
+    assert str(raised.value) == "replay needs MuJoCo: pip install 'casadi-hands[sim]'"
 
 
 def test_without_imageio_the_message_is_one_line(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -67,14 +69,27 @@ def test_without_imageio_the_message_is_one_line(folder: Path, tmp_path: Path, m
         film(folder, tmp_path / "film.gif")
 
 
-def test_a_backend_that_mujoco_cannot_load_is_named_in_one_line(folder: Path) -> None:
+def test_an_opengl_that_mujoco_cannot_load_is_named_in_one_line_filmed_or_not(folder: Path) -> None:
     # MuJoCo reads MUJOCO_GL once, as it is imported.
     environment = {**os.environ, "MUJOCO_GL": "abacus", "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM, str(folder)], capture_output=True, text=True, env=environment, timeout=60
     )
     assert done.stderr == ""
-    assert re.fullmatch(r"MuJoCo cannot draw here \(.*MUJOCO_GL: abacus\); try MUJOCO_GL=egl or .*\n", done.stdout)
+    plain, filmed = done.stdout.splitlines()
+    assert plain == filmed
+    assert re.fullmatch(
+        r"MuJoCo cannot be loaded \(.*MUJOCO_GL: abacus\); try MUJOCO_GL=egl or MUJOCO_GL=osmesa, .*", plain
+    )
+
+
+def test_the_advice_to_replay_without_opengl_works(folder: Path) -> None:
+    program = "import sys; from casadi_hands.verify import replay; print(replay(sys.argv[1]).dropped)"
+    environment = {**os.environ, "MUJOCO_GL": "disable", "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-c", program, str(folder)], capture_output=True, text=True, env=environment, timeout=60
+    )
+    assert (done.stdout, done.stderr) == ("False\n", "")
 
 
 def test_what_cannot_be_drawn_or_written_is_one_line(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
