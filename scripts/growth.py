@@ -12,23 +12,23 @@ on the machine disturbs less.
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from isolated import isolated, largest_memory
-from shared import NOTHING, write_table
+from shared import NOTHING, options_of, write_table
 
 from casadi_hands.nlp import Options, Solution, Solver
 from casadi_hands.search.seeds import random_finger
+from casadi_hands.stages import refine
 from casadi_hands.stages.floating import Floating, FloatingStage
 from casadi_hands.stages.model import Model, build_model
 from casadi_hands.stages.object_side import object_parameters, sizes, term_weights
-from casadi_hands.stages.refine import SOFT, WEIGHTS, Margin, RefineStage
 from casadi_hands.stages.synthesis import OPTIONS, FingerSeed, SynthesisStage
 from casadi_hands.stages.target import Target, target_of
 from casadi_hands.stages.whole_hand import OPTIONS as WHOLE
@@ -70,9 +70,7 @@ class Point:
 
 def main() -> None:
     """Measure every sweep, print the table and the growth with the motion's length."""
-    parser = argparse.ArgumentParser(
-        description=__doc__.partition("\n")[0], formatter_class=argparse.ArgumentDefaultsHelpFormatter
-    )
+    parser = options_of(__doc__)
     parser.add_argument("--sweeps", nargs="+", choices=list(SWEEPS), default=list(SWEEPS), help="what to change")
     parser.add_argument("--stages", nargs="+", choices=STAGES, default=list(STAGES), help="stages to measure")
     parser.add_argument("--limit", type=float, default=300.0, help="s for each point")
@@ -239,15 +237,14 @@ def _refine(task: Task, model: Model, size: Size) -> Measured:
     whole = WholeHandStage(model, contacts, joints, False)
     start = whole.solve(floating, tuple(alone), dict(task.weights.whole_hand), replace(WHOLE, max_iter=40))
 
-    def iterate(stage: RefineStage) -> list[Solution]:
-        margin = Margin()
-        weighted = {f"weight.{term}": WEIGHTS[term] / stage.knots for term in stage.problem.terms}
-        options = replace(SOFT, max_iter=ITERATIONS)
-        always, _ = stage._constraint_bounds(margin)
-        parameters = stage._parameters(start, margin) | weighted
-        return [stage.solver.solve(stage._start(start), parameters, options, *stage._bounds(), always)]
+    settings = {name: getattr(refine, name) for name in ("SOFT", "CLOSER", "HARD", "HARD_FROM_AFAR")}
+    short = {name: replace(options, max_iter=ITERATIONS) for name, options in settings.items()}
 
-    return lambda: RefineStage(model, contacts, joints, start.active), iterate
+    def iterate(stage: refine.RefineStage) -> list[Solution]:
+        with patch.multiple(refine, **short):
+            return [solution for _, solution in stage.solve(start).runs]
+
+    return lambda: refine.RefineStage(model, contacts, joints, start.active), iterate
 
 
 _STAGES: dict[str, Callable[[Task, Model, Size], Measured]] = {

@@ -116,7 +116,7 @@ def ours(
         options = replace(posed.options, extra=posed.options.extra + extra)
         values, low, high = (problem.variables.unpack(v) for v in (posed.start, posed.lower, posed.upper))
         solution = solver.solve(values, problem.parameters.unpack(posed.parameters), options, low, high, free)
-        record = solver._solver(options).stats()
+        record = solver.nlpsol(options).stats()
         attempts.append(_ipopt_attempt(record, solution.seconds))
     solving = sum(attempt.seconds for attempt in attempts)
     return Run(time.perf_counter() - began - solving, attempts)
@@ -183,7 +183,7 @@ def _scipy_attempt(name: str, gradient: ca.Function, posed: Posed, limit: float)
 
 
 @dataclass(frozen=True)
-class _Bind:
+class Bind:
     """What ``Problem.bind`` was called with."""
 
     kernel: Kernel
@@ -192,12 +192,13 @@ class _Bind:
 
 
 @contextmanager
-def _recorded_binds() -> Iterator[list[_Bind]]:
-    binds: list[_Bind] = []
+def recorded_binds() -> Iterator[list[Bind]]:
+    """What ``Problem.bind`` is called with meanwhile."""
+    binds: list[Bind] = []
     original = Problem.bind
 
     def bind(self: Problem, kernel: Kernel, variables: Any, parameters: Any = (), bounds: Any = None) -> None:
-        binds.append(_Bind(kernel, variables, parameters))
+        binds.append(Bind(kernel, variables, parameters))
         original(self, kernel, variables, parameters, bounds)
 
     Problem.bind = bind  # type: ignore[method-assign]
@@ -207,7 +208,7 @@ def _recorded_binds() -> Iterator[list[_Bind]]:
         Problem.bind = original  # type: ignore[method-assign]
 
 
-def opti_cost(problem: Problem, binds: Sequence[_Bind], x: ca.MX, p: ca.MX) -> ca.MX:
+def opti_cost(problem: Problem, binds: Sequence[Bind], x: ca.MX, p: ca.MX) -> ca.MX:
     """The cost as it is usually written: for each term and sample a call of its function, summed up."""
     total = ca.MX(0)
     for bind in binds:
@@ -242,7 +243,7 @@ def opti(build: Build, programs: Sequence[Posed], limit: float, *, expand: bool 
         limit: s for each.
         expand: turn the whole into scalar operations first, Opti's own option.
     """
-    with _recorded_binds() as binds:
+    with recorded_binds() as binds:
         problem: Problem = build().solver.problem
     began = time.perf_counter()
     opti = ca.Opti()

@@ -45,7 +45,7 @@ class Ledger:
         """Book every stage that is built and every solve meanwhile."""
         stages = (FloatingStage, SynthesisStage, WholeHandStage, RefineStage)
         patches = [patch.object(stage, "__init__", self._timed(stage.__init__)) for stage in stages]
-        patches += [patch.object(Solver, "_solver", self._timed(Solver._solver))]
+        patches += [patch.object(Solver, "nlpsol", self._timed(Solver.nlpsol))]
         patches += [patch.object(Solver, "solve", self._booked(Solver.solve))]
         for each in patches:
             each.start()
@@ -71,7 +71,7 @@ class Ledger:
     def _booked(self, function: Callable[..., Solution]) -> Callable[..., Solution]:
         def booked(solver: Solver, start: Any, parameters: Any, options: Any = None, *rest: Any, **named: Any) -> Any:
             solution = function(solver, start, parameters, options, *rest, **named)
-            record = solver._solver(options or Options()).stats()
+            record = solver.nlpsol(options or Options()).stats()
             booked = self.seconds[self.stage]
             left = solution.seconds
             for kind, names in _CALLED.items():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from argparse import ArgumentDefaultsHelpFormatter, ArgumentParser
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -95,6 +96,11 @@ def replays_of(folder: Path, count: int, jobs: int) -> dict[str, Any]:
     }
     file.write_text(json.dumps(played, indent=1), encoding="utf-8")
     return played
+
+
+def options_of(doc: str) -> ArgumentParser:
+    """A parser for a script: its help is the first line of the script's docstring, with every option's default."""
+    return ArgumentParser(description=doc.partition("\n")[0], formatter_class=ArgumentDefaultsHelpFormatter)
 
 
 def joints_of(design: Design) -> str:

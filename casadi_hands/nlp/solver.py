@@ -80,7 +80,8 @@ class Solver:
         self.functions = problem.functions()
         self._solvers: dict[Options, ca.Function] = {}
 
-    def _solver(self, options: Options) -> ca.Function:
+    def nlpsol(self, options: Options) -> ca.Function:
+        """CasADi's function that runs IPOPT so, built when it is first asked for; ``stats()`` are of its last run."""
         if options not in self._solvers:
             f = self.functions
             settings: dict[str, Any] = {
@@ -123,7 +124,7 @@ class Solver:
             KeyboardInterrupt: the solve was interrupted.
         """
         problem, p = self.problem, self._parameters(parameters)
-        solver = self._solver(options or Options())
+        solver = self.nlpsol(options or Options())
         lbx = problem.variables.pack(lower or {}, problem.lower)
         ubx = problem.variables.pack(upper or {}, problem.upper)
         x0 = np.clip(problem.variables.pack(start, np.zeros(problem.variables.size)), lbx, ubx)

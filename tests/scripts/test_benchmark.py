@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from benchmark import PEERS, SPENT, compared, reached, shares, slowness
-from growth import Size, exponent, task_of
+from growth import ITERATIONS, Size, exponent, measure, task_of
 from isolated import Outcome, isolated
-from peers import Attempt, Run
+from peers import Attempt, Run, recorded_solves
 from profiled import KINDS, Ledger
 
 from casadi_hands import load_task
@@ -94,6 +94,15 @@ def test_tasks_are_of_the_size_asked_for(size: Size) -> None:
 def test_the_exponent_is_that_of_a_power() -> None:
     sizes = [11, 21, 41, 81]
     assert exponent(sizes, [0.02 * n**1.3 for n in sizes]) == pytest.approx(1.3, rel=1e-9)
+
+
+def test_a_point_of_refine_is_measured_on_few_iterations() -> None:
+    with recorded_solves() as posed:
+        point = measure("refine", Size(2, 5, 1, 1))
+    own = [program.options.max_iter for program in posed if len(program.start) == point.variables]
+    # Soft and firm at least, once to compile and once to measure.
+    assert len(own) >= 4
+    assert set(own) == {ITERATIONS}
 
 
 def test_a_call_of_its_own_process_returns_fails_or_is_stopped() -> None:

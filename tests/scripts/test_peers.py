@@ -7,7 +7,7 @@ from functools import partial
 import casadi as ca
 import numpy as np
 import pytest
-from peers import Method, Posed, _recorded_binds, by_scipy, opti, opti_cost, ours, recorded_solves
+from peers import Method, Posed, by_scipy, opti, opti_cost, ours, recorded_binds, recorded_solves
 from scipy.optimize import minimize, rosen
 
 from casadi_hands.nlp import Kernel, Options, Problem, Solver
@@ -99,7 +99,7 @@ def test_a_limit_of_time_leaves_the_best_until_then(name: str, posed: Posed) -> 
 
 
 def test_the_cost_written_for_opti_is_the_problem_s(posed: Posed) -> None:
-    with _recorded_binds() as binds:
+    with recorded_binds() as binds:
         problem = Valley().solver.problem
     x, p = ca.MX.sym("x", 5), ca.MX.sym("p", 3)
     cost = ca.Function("cost", [x, p], [opti_cost(problem, binds, x, p)])
