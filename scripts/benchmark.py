@@ -10,9 +10,9 @@ annealing steps each; a step starts where the program's own solve of the step be
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
+from argparse import BooleanOptionalAction
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -23,7 +23,7 @@ import numpy as np
 from isolated import Outcome, isolated
 from peers import Attempt, Build, Method, Posed, Run, by_scipy, opti, ours, recorded_solves
 from profiled import KINDS, profiled_solve
-from shared import NOTHING, write_table
+from shared import NOTHING, options_of, write_table
 
 from casadi_hands import load_task
 from casadi_hands.search.seeds import random_finger
@@ -74,15 +74,13 @@ class Problems:
 
 def main() -> None:
     """Benchmark every task."""
-    parser = argparse.ArgumentParser(
-        description=__doc__.partition("\n")[0], formatter_class=argparse.ArgumentDefaultsHelpFormatter
-    )
+    parser = options_of(__doc__)
     parser.add_argument("tasks", metavar="TASK", nargs="+", type=Path, help="task files")
     parser.add_argument("--trials", type=int, default=2, help="random starts of the finger")
     parser.add_argument("--joints", type=int, default=2, help="joints of the finger")
     parser.add_argument("--limit", type=float, default=20.0, help="s for each solve of a peer")
-    parser.add_argument("--peers", action=argparse.BooleanOptionalAction, default=True, help="compare optimisers")
-    parser.add_argument("--profile", action=argparse.BooleanOptionalAction, default=True, help="profile whole solves")
+    parser.add_argument("--peers", action=BooleanOptionalAction, default=True, help="compare optimisers")
+    parser.add_argument("--profile", action=BooleanOptionalAction, default=True, help="profile whole solves")
     parser.add_argument("--out", type=Path, default=Path("results/benchmark"), help="folder for tables and chart")
     given = parser.parse_args()
     comparisons: list[list[str]] = []

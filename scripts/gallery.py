@@ -8,13 +8,12 @@ time. ``gallery.html`` and ``table.md`` are written there after every solve.
 
 from __future__ import annotations
 
-import argparse
 import os
 from pathlib import Path
 
 from cards import page
 from entries import REPLAYS, Entry, entry_of, figures_of
-from shared import NOTHING, kept_solve, table_text
+from shared import NOTHING, kept_solve, options_of, table_text
 
 PAGE = "gallery.html"
 HEAD = (
@@ -35,9 +34,7 @@ HEAD = (
 
 def main() -> None:
     """Solve what is not solved yet, and write page and table."""
-    parser = argparse.ArgumentParser(
-        description=__doc__.partition("\n")[0], formatter_class=argparse.ArgumentDefaultsHelpFormatter
-    )
+    parser = options_of(__doc__)
     parser.add_argument("problems", metavar="DIR", nargs="?", type=Path, default=Path("problems"), help="task files")
     parser.add_argument("--seeds", nargs="+", type=int, default=[0], help="seeds; a card shows the best")
     parser.add_argument("--out", type=Path, default=Path("results/gallery"), help="folder for results, page and table")

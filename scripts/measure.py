@@ -8,12 +8,11 @@ written to ``table.md`` beside them after every row.
 
 from __future__ import annotations
 
-import argparse
 import os
 from pathlib import Path
 from typing import Any
 
-from shared import NOTHING, joints_of, kept_solve, replays_of, write_table
+from shared import NOTHING, joints_of, kept_solve, options_of, replays_of, write_table
 
 from casadi_hands import Design, audit
 from casadi_hands.errors import DesignError
@@ -43,9 +42,7 @@ STAGES = ("floating", "synthesis", "whole_hand", "refine")
 
 def main() -> None:
     """Measure every task with every seed."""
-    parser = argparse.ArgumentParser(
-        description=__doc__.partition("\n")[0], formatter_class=argparse.ArgumentDefaultsHelpFormatter
-    )
+    parser = options_of(__doc__)
     parser.add_argument("tasks", metavar="TASK", nargs="+", type=Path, help="task files")
     parser.add_argument("--seeds", nargs="+", type=int, default=[0, 1, 2], help="seeds of the search")
     parser.add_argument("--replays", type=int, default=100, help="perturbed replays of each result")

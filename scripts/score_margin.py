@@ -8,11 +8,10 @@ those of the best hand where all fingers have one joint, and where all have two;
 
 from __future__ import annotations
 
-import argparse
 import os
 from pathlib import Path
 
-from shared import SEEDS, write_table
+from shared import SEEDS, options_of, write_table
 
 from casadi_hands import load_task
 from casadi_hands.search.algorithm import Candidate, Search
@@ -30,9 +29,7 @@ HEAD = ("task", "seed", "joints", "scores", "ratios to the threshold")
 
 def main() -> None:
     """Score hands of one and of two joints a finger."""
-    parser = argparse.ArgumentParser(
-        description=__doc__.partition("\n")[0], formatter_class=argparse.ArgumentDefaultsHelpFormatter
-    )
+    parser = options_of(__doc__)
     parser.add_argument("--seeds", nargs="+", type=int, default=list(SEEDS), help="seeds of the search")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes")
     given = parser.parse_args()

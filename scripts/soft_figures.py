@@ -7,12 +7,11 @@ Everything is measured on the files of the results, which stay in ``--out`` and 
 
 from __future__ import annotations
 
-import argparse
 import os
 from pathlib import Path
 
 import numpy as np
-from shared import SEEDS, joints_of, kept_solve, write_table
+from shared import SEEDS, joints_of, kept_solve, options_of, write_table
 
 from casadi_hands.verify.clearance import penetration_figure
 from casadi_hands.verify.contact import Placements, active_contacts, surface_normals
@@ -38,9 +37,7 @@ HEAD = (
 
 def main() -> None:
     """Measure every task with every seed."""
-    parser = argparse.ArgumentParser(
-        description=__doc__.partition("\n")[0], formatter_class=argparse.ArgumentDefaultsHelpFormatter
-    )
+    parser = options_of(__doc__)
     parser.add_argument("tasks", metavar="TASK", nargs="+", type=Path, help="task files")
     parser.add_argument("--seeds", nargs="+", type=int, default=list(SEEDS), help="seeds of the search")
     parser.add_argument("--out", type=Path, default=Path("results/measured"), help="folder for the results")

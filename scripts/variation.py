@@ -9,14 +9,13 @@ there after every solve.
 
 from __future__ import annotations
 
-import argparse
 import os
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
 from entries import STATES, state_of
-from shared import joints_of, kept_solve, table_text
+from shared import joints_of, kept_solve, options_of, table_text
 from vary import Change, write_variation
 
 from casadi_hands import Design, load_task
@@ -58,9 +57,7 @@ class Run:
 
 def main() -> None:
     """Write, solve and count variations."""
-    parser = argparse.ArgumentParser(
-        description=__doc__.partition("\n")[0], formatter_class=argparse.ArgumentDefaultsHelpFormatter
-    )
+    parser = options_of(__doc__)
     parser.add_argument("tasks", metavar="TASK", nargs="+", type=Path, help="task files")
     parser.add_argument("--count", type=int, default=5, help="variations of each task")
     parser.add_argument("--seed", type=int, default=0, help="seed of the changes")
