@@ -25,6 +25,7 @@ REPLAYS = 12  # perturbed ones, that a certified design is tried on
 DROPS = 1  # of them, that pass
 OUT_OF_REACH = 0.3  # half extents that a finger misses its contact by: nothing is left to refine
 HANDS_REFINED = 2  # hands of one structure that are tried before fingers get another joint
+Ranked = tuple[tuple[int, int], Design]
 
 
 class Certifier:
@@ -43,28 +44,29 @@ class Certifier:
         self, record: Record, model: Model, floating: Floating, search: Search, judge: Judge, jobs: int
     ) -> None:
         self.record, self.model, self.floating, self.search = record, model, floating, search
-        self.judge, self.jobs = judge, jobs
+        self.judge, self.refiner = judge, Refiner(record, model, judge, jobs)
 
-    def run(self, found: Found) -> Design:
+    def run(self, found: Found, best: Ranked | None = None) -> Design:
         """Refine the best hand, the next best, then hands with one more joint where those failed.
 
         A certified hand whose replays drop the object makes way for the next best of its structure that does better.
+
+        Args:
+            found: by the search.
+            best: a design there is already, which is returned where none is better.
         """
-        best: tuple[tuple[int, int], Design] | None = None
         if found.farthest > OUT_OF_REACH:
             run_whole_hand(self.record, self.model, self.floating, found.candidates[0])
-            return self.judge.judge(self.record.design, found.short)
+            return better(best, ranked(self.judge.judge(self.record.design, found.short), REPLAYS))[1]
         while True:
             failing: set[str] = set()
             for candidate in found.candidates[:HANDS_REFINED]:
                 judged, refined, drops = self._certify(candidate, found.short)
-                if judged.status == "certified" and drops <= DROPS:
+                if serves(judged, drops):
                     return judged
                 if judged.status != "certified":
                     self.record.say("refine", f"not certified: {judged.reason}")
-                missed = sum(not figure["holds"] for figure in judged.certificate.values())
-                if best is None or (missed, drops) < best[0]:
-                    best = ((missed, drops), judged)
+                best = better(best, ranked(judged, drops))
                 failing |= failing_fingers(self.model, refined)
                 if refined.slips_hopelessly:
                     break  # a structure that must slip will do so in any of its hands
@@ -75,35 +77,72 @@ class Certifier:
             found = run_search(self.record, self.model, self.search, least)
 
     def _certify(self, candidate: Candidate, short: tuple[Reason, ...]) -> tuple[Design, Refined, int]:
-        """Refine one hand with an ample margin, with a small one where that fails, with more where a replay drops.
+        """Find a hand's motion and refine it."""
+        whole = run_whole_hand(self.record, self.model, self.floating, candidate)
+        return self.refiner.certify(whole, short)
+
+    def _more_joints(self, found: Found, failing: set[str]) -> dict[int, int] | None:
+        """Joints of each finger for the next round; None when no failing finger may have more."""
+        best = found.candidates[0]
+        joints = dict(zip(best.hand.contacts, best.joints, strict=True))
+        chosen = [c for c in joints if self.model.contact_names[c] in failing] or list(joints)
+        chosen = [c for c in chosen if joints[c] < self.search.max_joints]
+        if not chosen:
+            return None
+        fewest = min(joints[c] for c in chosen)
+        return {c: n + (c in chosen and n == fewest) for c, n in joints.items()}
+
+
+class Refiner:
+    """Refines a hand and tries it on replays.
+
+    Args:
+        record: of the solve; its design is the hand with the motion to be refined.
+        model: the task.
+        judge: of the designs.
+        jobs: processes for the replays.
+    """
+
+    def __init__(self, record: Record, model: Model, judge: Judge, jobs: int) -> None:
+        self.record, self.model, self.judge, self.jobs = record, model, judge, jobs
+
+    def certify(
+        self, whole: WholeHand, short: tuple[Reason, ...], margin: Margin = AMPLE, near: bool = False
+    ) -> tuple[Design, Refined, int]:
+        """Refine one hand with a margin, with a small one where that fails, with more where a replay drops.
+
+        Args:
+            whole: the hand and its motion.
+            short: what its fingers could not do before.
+            margin: the first to be tried.
+            near: whether the motion is nearly exact already.
 
         Returns:
             the design, its refinement, and how many of its replays drop the object.
         """
-        whole = run_whole_hand(self.record, self.model, self.floating, candidate)
         planned = self.record.design
         with self.record.stage("refine", "the same motion with exact physics, rolling contacts and clearance"):
-            stage = RefineStage(self.model, whole.contacts, candidate.joints, whole.active)
-            refined = self._attempt(stage, whole, AMPLE)
-        if not refined.exact and not refined.slips_hopelessly:
+            stage = RefineStage(self.model, whole.contacts, tuple(f.joints for f in whole.fingers), whole.active)
+            refined = self._attempt(stage, whole, margin, near)
+        if not refined.exact and not refined.slips_hopelessly and margin != SMALL:
             with self.record.stage("refine", "again, closer to the limits of friction and grip"):
                 second = self._attempt(stage, whole, SMALL)
             refined = second if second.exact or second.worst[1] < refined.worst[1] else refined
         judged = self._judged(refined, short, planned)
         drops = self._drops(judged)
-        if drops > DROPS:
+        if drops > DROPS and margin != FIRM:
             text = f"again with a firmer grip: {drops} of {REPLAYS} replays dropped the object"
             with self.record.stage("refine", text):
-                firmer = self._attempt(stage, whole, FIRM)
+                firmer = self._attempt(stage, whole, FIRM, near)
             again = self._judged(firmer, short, planned)
             fewer = self._drops(again) if again.status == "certified" else drops
             if fewer < drops:
                 return again, firmer, fewer
         return judged, refined, drops
 
-    def _attempt(self, stage: RefineStage, whole: WholeHand, margin: Margin) -> Refined:
+    def _attempt(self, stage: RefineStage, whole: WholeHand, margin: Margin, near: bool = False) -> Refined:
         """Refine with one margin, and record its solves whether they serve or not."""
-        result = stage.solve(whole, margin)
+        result = stage.solve(whole, margin, near)
         what = f"hand, {margin.friction:g} of the friction and {margin.normal_force:g} weights of grip"
         runs = [run_record("refine", what, self.record.task.search.seed, step, s) for step, s in result.runs]
         length = self.model.units.length
@@ -138,13 +177,17 @@ class Certifier:
                 return REPLAYS
             return sum(r.dropped for r in replay_many(scratch, REPLAYS, jobs=self.jobs))
 
-    def _more_joints(self, found: Found, failing: set[str]) -> dict[int, int] | None:
-        """Joints of each finger for the next round; None when no failing finger may have more."""
-        best = found.candidates[0]
-        joints = dict(zip(best.hand.contacts, best.joints, strict=True))
-        chosen = [c for c in joints if self.model.contact_names[c] in failing] or list(joints)
-        chosen = [c for c in chosen if joints[c] < self.search.max_joints]
-        if not chosen:
-            return None
-        fewest = min(joints[c] for c in chosen)
-        return {c: n + (c in chosen and n == fewest) for c, n in joints.items()}
+
+def serves(design: Design, drops: int) -> bool:
+    """Whether a design is certified and hardly any of its replays drop the object: there is no need for another."""
+    return design.status == "certified" and drops <= DROPS
+
+
+def ranked(design: Design, drops: int) -> Ranked:
+    """A design behind what it misses: limits of the certificate first, then replays."""
+    return (sum(not figure["holds"] for figure in design.certificate.values()), drops), design
+
+
+def better(first: Ranked | None, second: Ranked) -> Ranked:
+    """The one that misses less; of equals the first."""
+    return second if first is None or second[0] < first[0] else first

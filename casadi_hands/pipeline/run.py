@@ -10,10 +10,11 @@ from pathlib import Path
 
 from casadi_hands.design import Design
 from casadi_hands.errors import SolveError
-from casadi_hands.pipeline.certify import Certifier
+from casadi_hands.pipeline.certify import REPLAYS, Certifier, Ranked, Refiner, ranked, serves
 from casadi_hands.pipeline.judge import Judge
 from casadi_hands.pipeline.record import STAGES, Progress, Record
-from casadi_hands.pipeline.steps import prepare_search, run_floating, run_search, run_whole_hand
+from casadi_hands.pipeline.steps import adopt, prepare_search, run_floating, run_search, run_whole_hand
+from casadi_hands.pipeline.warm import as_floating, kept_margin, warm_start
 from casadi_hands.search.work import processes
 from casadi_hands.stages.model import build_model
 from casadi_hands.task import Task
@@ -26,6 +27,7 @@ def solve(
     jobs: int | None = None,
     until: str = "refine",
     out: Path | None = None,
+    start: Path | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> Design:
     """Design a hand for a task.
@@ -36,26 +38,49 @@ def solve(
         jobs: processes for the trials; all cores by default. The design does not depend on it.
         until: the last stage to run.
         out: folder that is written after every stage, so that nothing computed is lost.
+        start: folder of an earlier result of nearly the same task. Its hand and motion are refined for the task as it
+            is now; only where that gives no certified hand are all stages run, and the better of both is kept.
         progress: told what is being done.
 
     Returns:
         The design; its status is earned by the audit of what is written.
 
     Raises:
-        SolveError: ``until`` is not a stage.
+        SolveError: ``until`` is not a stage, or not the last where there is a start; or the start is of a task of
+            another structure.
+        DesignError: there is no result in ``start``.
     """
     if until not in STAGES:
         raise SolveError(f"until: given {until!r}; allowed: {', '.join(STAGES)}")
+    if start is not None and until != STAGES[-1]:
+        raise SolveError(f"from an earlier result only the stage {STAGES[-1]} is run; it cannot stop after {until}")
     if seed is not None:
         task = task.model_copy(update={"search": task.search.model_copy(update={"seed": seed})})
     jobs = jobs or os.cpu_count() or 1
     record = Record(task, out, progress or (lambda _: None))
     with processes(jobs) as executor:
-        return record.keep(_run(record, until, executor, jobs))
+        best = None if start is None else _refine_again(record, start, jobs)
+        if best is not None and serves(best[1], best[0][1]):
+            return record.keep(best[1])
+        return record.keep(_run(record, until, executor, jobs, best))
 
 
-def _run(record: Record, until: str, executor: Executor | None, jobs: int) -> Design:
-    """All stages, to the last one asked for."""
+def _refine_again(record: Record, start: Path, jobs: int) -> Ranked:
+    """The hand and the motion of an earlier result, refined for the task as it is now."""
+    earlier, model = Design.load(start), build_model(record.task)
+    whole, margin = warm_start(earlier, record.task, model), kept_margin(earlier)
+    adopt(record, model, whole)
+    judge = Judge(model, as_floating(model, whole))
+    design, _, drops = Refiner(record, model, judge, jobs).certify(whole, (), margin, near=True)
+    record.update(stages=[{**run, "started_from": str(start)} for run in record.design.stages])
+    if not serves(design, drops):
+        why = design.reason or f"{drops} of {REPLAYS} replays dropped the object"
+        record.say("refine", f"from the earlier result no hand serves: {why}; now all stages")
+    return ranked(design, drops)
+
+
+def _run(record: Record, until: str, executor: Executor | None, jobs: int, best: Ranked | None) -> Design:
+    """All stages, to the last one asked for; ``best`` is a design there is already."""
     model = build_model(record.task)
     floating = run_floating(record, model)
     model = floating.model
@@ -69,7 +94,7 @@ def _run(record: Record, until: str, executor: Executor | None, jobs: int) -> De
     if until == "whole_hand":
         run_whole_hand(record, model, floating, found.candidates[0])
         return judge.judge(record.design, found.short)
-    return Certifier(record, model, floating, search, judge, jobs).run(found)
+    return Certifier(record, model, floating, search, judge, jobs).run(found, best)
 
 
 def _stopped(design: Design, stage: str) -> Design:

@@ -27,7 +27,7 @@ def random_finger(target: Target, contact: int, joints: int, rng: np.random.Gene
     return FingerSeed(
         base=base,
         lengths=lengths,
-        frames=np.array([_frame_about(_random_axis(rng)) for _ in range(joints)]),
+        frames=np.array([frame_about(_random_axis(rng)) for _ in range(joints)]),
         axes=np.zeros((joints, 2)),
         angles=np.tile(angles, (len(target.times), 1)),
         tips=tip,
@@ -40,7 +40,7 @@ def _random_axis(rng: np.random.Generator) -> Array:
     return np.asarray(vector / np.linalg.norm(vector))
 
 
-def _frame_about(axis: Array) -> Array:
+def frame_about(axis: Array) -> Array:
     """A rotation (3, 3) whose third column is ``axis``."""
     helper = np.eye(3)[np.argmin(np.abs(axis))]
     x = np.cross(helper, axis)

@@ -113,26 +113,39 @@ class RefineStage:
         self.bearing = active & np.vstack([active[:1], active[:-1]])
         self.solver = Solver(self.problem)
 
-    def solve(self, start: WholeHand, margin: Margin | None = None) -> Refined:
-        """Refine a whole-hand motion: rolling and supply soft, then firm, then constraints."""
+    def solve(self, start: WholeHand, margin: Margin | None = None, near: bool = False) -> Refined:
+        """Refine a whole-hand motion: rolling and supply soft, then firm, then constraints.
+
+        Args:
+            start: the motion.
+            margin: to keep to the limits.
+            near: whether the motion is nearly exact already: then constraints are tried at once, and the way through
+                costs is taken only where they are not met.
+        """
         margin = margin or Margin()
         values, parameters = self._start(start), self._parameters(start, margin)
         lower, upper = self._bounds()
         always, exact = self._constraint_bounds(margin)
         runs: list[tuple[str, Solution]] = []
         slips: dict[str, float] = {}
-        for what, weights, hard, options in (
+        steps = (
             ("soft", WEIGHTS, Bounds(), SOFT),
             ("firm", WEIGHTS | FIRM, Bounds(), CLOSER),
             ("exact", WEIGHTS | EXACT, exact, HARD),
-        ):
-            if what == "exact" and max(slips.values()) > AFAR:
+        )
+        for what, weights, hard, options in (*steps[2:], *steps) if near else steps:
+            if what == "exact" and max(slips.values(), default=0.0) > AFAR:
                 options = HARD_FROM_AFAR
             weighted: dict[str, ArrayLike] = {
                 f"weight.{term}": weights[term] / self.knots for term in self.problem.terms
             }
             solution = self.solver.solve(values, parameters | weighted, options, lower, upper, always | hard)
             runs.append((what, solution))
+            if what == "exact" and not slips:
+                if solution.violation <= ACCEPTED:
+                    slips = self._slips(solution)
+                    break
+                continue  # from the start again, not from where this ended
             values = solution.values
             if what == "firm":
                 slips = self._slips(solution)
