@@ -11,8 +11,11 @@ import os
 from pathlib import Path
 
 import numpy as np
-from shared import SEEDS, joints_of, kept_solve, options_of, write_table
+from apart import ended
+from shared import NOTHING, SEEDS, joints_of, kept_solve, options_of, write_table
 
+from casadi_hands import Design
+from casadi_hands.errors import DesignError
 from casadi_hands.verify.clearance import penetration_figure
 from casadi_hands.verify.contact import Placements, active_contacts, surface_normals
 from casadi_hands.verify.dynamics import sample_residual, shoot
@@ -47,13 +50,25 @@ def main() -> None:
     for task in given.tasks:
         for seed in given.seeds:
             design, path = kept_solve(task, seed, "whole_hand", given.out, given.jobs)
-            figures = soft_figures(read_folder(path))
-            rows.append([design.task.name, str(seed), joints_of(design), *figures, f"{design.seconds['total']:.0f}"])
+            seconds = design.seconds.get("total")
+            ends = [NOTHING if seconds is None else f"{seconds:.0f}"]
+            rows.append([design.task.name, str(seed), joints_of(design), *figures_of(design, path), *ends])
             write_table(HEAD, rows, given.out / "soft.md")
 
 
+def figures_of(design: Design, path: Path) -> list[str]:
+    """The figures between ``joints`` and the time in ``HEAD``; where there is nothing to measure, why, and dashes."""
+    try:
+        # What a solve that did not end by itself has left is not its result.
+        if not ended(path):
+            return soft_figures(read_folder(path))
+    except DesignError:
+        pass
+    return [f"failed: {design.reason.split(';')[0]}", *[NOTHING] * (len(HEAD) - 5)]
+
+
 def soft_figures(folder: Folder) -> list[str]:
-    """The figures between ``joints`` and the time in ``HEAD``, each the worst over the motion."""
+    """What `figures_of` gives of a whole result: each figure is the worst over the motion."""
     placed, shots = sample_placements(folder), shoot(folder)
     goals = {figure.name: figure.value for figure in goal_figures(folder)}
     from_object, from_finger = contact_distances(folder, placed)

@@ -9,6 +9,7 @@ import sys
 import time
 from pathlib import Path
 
+from casadi_hands.task import Task
 from tests.export.example import example_design
 
 
@@ -27,6 +28,10 @@ def hangs(task: object, folder: Path, until: str, jobs: int | None) -> None:
 def crashes(task: object, folder: Path, until: str, jobs: int | None) -> None:
     example_design().save(folder)
     ctypes.string_at(0)
+
+
+def crashes_with_seed_0(task: Task, folder: Path, until: str, jobs: int | None) -> None:
+    (crashes if task.search.seed == 0 else ends)(task, folder, until, jobs)
 
 
 def raises(task: object, folder: Path, until: str, jobs: int | None) -> None:
