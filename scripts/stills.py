@@ -14,7 +14,7 @@ from casadi_hands.design import Hand
 from casadi_hands.export.markup import OBJECT_COLOR, PALM_COLOR, finger_color, joint_color
 from casadi_hands.export.urdf import hand_urdf
 from casadi_hands.view.robot import Robot
-from casadi_hands.view.scene import EXTERNAL_COLOR, FORCE_COLOR, GOAL_COLOR
+from casadi_hands.view.scene import EXTERNAL_COLOR, FORCE_COLOR, GOAL_COLOR, eye_towards
 from casadi_hands.view.timeline import Timeline, design_timeline, goal_poses
 
 MOMENTS = 5
@@ -69,7 +69,7 @@ def stills(design: Design, times: list[float]) -> list[bytes]:
     scenes = [_bodies(design, timeline, k) for k in samples]
     arrows = [_arrows(design, timeline, k) for k in samples]
     everything = [*_goals(design), *(body for row in (*scenes, *arrows) for body in row)]
-    camera = look(_eye(design.task.palm.rotation[:, 2]), _extent(everything), SIZE)
+    camera = look(eye_towards(design.task.palm.rotation[:, 2]), _extent(everything), SIZE)
     ground = design.task.ground
     pictures = []
     for bodies, pieces in zip(scenes, arrows, strict=True):
@@ -171,13 +171,3 @@ def _arrows(design: Design, timeline: Timeline, sample: int) -> list[Capsule]:
             ball = tip - share * head * along
             pieces.append(Capsule(ball, ball, 3.2 * width * share, color))
     return pieces
-
-
-def _eye(facing: np.ndarray) -> np.ndarray:
-    """Direction (3,) to the camera: from the palm's side, a little from above and from where the fingers point."""
-    level = np.array([facing[0], facing[1], 0.0])
-    if np.linalg.norm(level) < 0.3:
-        level = np.array([1.0, 0.0, 0.0])
-    level /= np.linalg.norm(level)
-    eye = np.cross(level, [0.0, 0.0, 1.0]) + 0.45 * level + [0.0, 0.0, 0.4]
-    return np.asarray(eye / np.linalg.norm(eye))

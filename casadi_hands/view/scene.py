@@ -84,7 +84,7 @@ def draw_scene(design: Design) -> Scene:
     force = _draw_forces(root, tracks, design.motion, radius) if design.motion else 0.0
     if len(timeline.time) > 1:
         recorder.send(SetAnimation(tracks.animation, play=False, repetitions=1))
-    return Scene(recorder.commands, timeline.time, _eye(task.palm.rotation[:, 2]), _legend(design), force)
+    return Scene(recorder.commands, timeline.time, eye_towards(task.palm.rotation[:, 2]), _legend(design), force)
 
 
 def _bare_palm(design: Design) -> Hand:
@@ -226,8 +226,8 @@ def _bounds(timeline: Timeline, hand: Robot, item: Robot, goals: np.ndarray) -> 
     return middle, float((np.linalg.norm(center - middle, axis=1) + reach[:, 0]).max())
 
 
-def _eye(facing: np.ndarray) -> np.ndarray:
-    """Direction to the camera: from the side, a little from above and from where the fingers point."""
+def eye_towards(facing: np.ndarray) -> np.ndarray:
+    """Direction (3,) to the camera: from the side, a little from above and from where the palm is facing (3,)."""
     level = np.array([facing[0], facing[1], 0.0])
     if np.linalg.norm(level) < 0.3:
         level = np.array([1.0, 0.0, 0.0])
