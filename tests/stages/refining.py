@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from casadi_hands.stages.model import Model
 from casadi_hands.stages.refine import Margin, RefineStage
 from casadi_hands.stages.whole_hand import WholeHand
-from tests.stages.example import made_up_finger, made_up_solution, project
+from tests.stages.example import drawing, everything, made_up_finger, made_up_solution, project
 
 Array = np.ndarray
 
@@ -104,3 +104,13 @@ class MadeUp:
     def forces(self) -> Array:
         """(S, columns, 3) object frame."""
         return self.values["force"].reshape(len(self.active), -1, 3)
+
+
+def carrying(on_ground: int = 9) -> MadeUp:
+    """Two of three fingers in use, the second lifted for a while; the ground bears load at the first ``on_ground`` samples."""
+    return MadeUp(everything()[1], (0, 2), lifted={2: (4, 7), 3: (on_ground, 99)})
+
+
+def sketching() -> MadeUp:
+    """A drawing, without a ground and without pushes; the second finger is lifted for a while."""
+    return MadeUp(drawing()[1], (0, 1), lifted={1: (4, 7)})

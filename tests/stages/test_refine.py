@@ -11,7 +11,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.design import Design
-from casadi_hands.search.algorithm import Search
 from casadi_hands.stages.floating import FloatingStage
 from casadi_hands.stages.model import Model, build_model
 from casadi_hands.stages.outcome import hand_of, joint_loads, whole_hand_motion
@@ -26,12 +25,12 @@ from casadi_hands.stages.refine import (
     RefineStage,
     longest_run,
 )
-from casadi_hands.stages.target import target_of
-from casadi_hands.stages.whole_hand import WholeHand, WholeHandStage
+from casadi_hands.stages.whole_hand import WholeHand
 from casadi_hands.task import Task, load_task
 from casadi_hands.verify import Audit, audit
-from tests.stages.example import drawing, everything, made_up_solution, project
-from tests.stages.refining import MadeUp
+from tests.stages.example import made_up_solution, project
+from tests.stages.refining import MadeUp, carrying, sketching
+from tests.stages.searched import whole_hand_of_two_joints
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 Array = np.ndarray
@@ -41,12 +40,12 @@ Array = np.ndarray
 
 @pytest.fixture(scope="module")
 def made_up() -> MadeUp:
-    return MadeUp(everything()[1], (0, 2), lifted={2: (4, 7), 3: (9, 99)})
+    return carrying()
 
 
 @pytest.fixture(scope="module")
 def drawn() -> MadeUp:
-    return MadeUp(drawing()[1], (0, 1), lifted={1: (4, 7)})
+    return sketching()
 
 
 def test_forces_vanish_where_contacts_bear_nothing_and_the_object_rests_at_both_ends(made_up: MadeUp) -> None:
@@ -205,22 +204,8 @@ def solved(tmp_path_factory: pytest.TempPathFactory) -> Solved:
     task = load_task(PROBLEMS / "horizontal_translation_no_gravity.yaml")
     model = build_model(task)
     floating = FloatingStage(model).solve(dict(task.weights.floating))
-    search = Search(
-        target_of(model, floating),
-        dict(task.weights.synthesis),
-        trials=3,
-        recombinations=1,
-        max_joints=2,
-        threshold=None,
-        seed=0,
-        executor=None,
-        progress=lambda _: None,
-    )
-    hand = search.run(dict.fromkeys(range(model.contacts), 2)).candidates[0].hand
-    joints = (2,) * model.contacts
-    stage = WholeHandStage(model, hand.contacts, joints, palm_moves=False)
-    whole = stage.solve(floating, hand.fingers, dict(task.weights.whole_hand))
-    refined = RefineStage(model, whole.contacts, joints, whole.active).solve(whole)
+    whole = whole_hand_of_two_joints(task, model, floating, trials=3)
+    refined = RefineStage(model, whole.contacts, (2,) * model.contacts, whole.active).solve(whole)
     result = refined.hand
     torque, speed = joint_loads(model, result)
     built = hand_of(task, model, result.fingers, result.contacts, torque, speed)

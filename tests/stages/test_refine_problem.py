@@ -9,27 +9,24 @@ from casadi_hands.stages.object_side import tool_path
 from casadi_hands.stages.refine import WEIGHTS
 from casadi_hands.stages.refine_problem import Structure
 from tests.stages.example import check_derivatives, doubling_each_weight, drawing, everything
-from tests.stages.refining import MadeUp
+from tests.stages.refining import MadeUp, carrying, sketching
 
 Array = np.ndarray
 
 
 @pytest.fixture(scope="module")
 def loaded() -> MadeUp:
-    """Two of three fingers in use, the second lifted for a while; the ground bears load at first."""
-    return MadeUp(everything()[1], (0, 2), lifted={2: (4, 7), 3: (9, 99)})
+    return carrying()
 
 
 @pytest.fixture(scope="module")
 def unloaded() -> MadeUp:
-    """The same, with nothing on the ground."""
-    return MadeUp(everything()[1], (0, 2), lifted={2: (4, 7), 3: (0, 99)})
+    return carrying(on_ground=0)
 
 
 @pytest.fixture(scope="module")
 def drawn() -> MadeUp:
-    """A drawing, without a ground and without pushes."""
-    return MadeUp(drawing()[1], (0, 1), lifted={1: (4, 7)})
+    return sketching()
 
 
 CASES = ("loaded", "unloaded", "drawn")

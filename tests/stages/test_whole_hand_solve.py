@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from casadi_hands.search.algorithm import Search
 from casadi_hands.stages.floating import Floating, FloatingStage
 from casadi_hands.stages.model import Model, build_model
-from casadi_hands.stages.target import target_of
-from casadi_hands.stages.whole_hand import WholeHand, WholeHandStage
+from casadi_hands.stages.whole_hand import WholeHand
 from casadi_hands.task import Task, load_task
 from tests.stages.example import Motion, PinFinger, project, spline_at
+from tests.stages.searched import whole_hand_of_two_joints
 from tests.stages.test_model import rotations
 
 TASK = Path(__file__).parents[2] / "problems" / "horizontal_translation.yaml"
@@ -45,21 +44,7 @@ def solved() -> Solved:
     task = load_task(TASK)
     model = build_model(task)
     floating = FloatingStage(model).solve(dict(task.weights.floating))
-    weights = dict(task.weights.synthesis)
-    search = Search(
-        target_of(model, floating),
-        weights,
-        trials=5,
-        recombinations=1,
-        max_joints=2,
-        threshold=None,
-        seed=0,
-        executor=None,
-        progress=lambda _: None,
-    )
-    hand = search.run(dict.fromkeys(range(model.contacts), 2)).candidates[0].hand
-    stage = WholeHandStage(model, hand.contacts, (2,) * model.contacts, palm_moves=False)
-    result = stage.solve(floating, hand.fingers, dict(task.weights.whole_hand))
+    result = whole_hand_of_two_joints(task, model, floating, trials=5)
     return Solved(task, model, floating, result)
 
 
