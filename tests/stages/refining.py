@@ -107,7 +107,7 @@ class MadeUp:
 
 
 def carrying(on_ground: int = 9) -> MadeUp:
-    """Two of three fingers in use, the second lifted for a while; the ground bears load at the first ``on_ground`` samples."""
+    """Two of three fingers in use, the second lifted for a while; the ground bears load at ``on_ground`` samples."""
     return MadeUp(everything()[1], (0, 2), lifted={2: (4, 7), 3: (on_ground, 99)})
 
 
