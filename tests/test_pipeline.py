@@ -21,6 +21,7 @@ from casadi_hands.pipeline import STAGES, Progress
 from casadi_hands.task import Task, parse_task
 from casadi_hands.task.limits import Limits
 from casadi_hands.verify import audit
+from tests.search import example
 from tests.stages.test_model import scaled
 
 PROBLEMS = Path(__file__).parents[1] / "problems"
@@ -28,18 +29,7 @@ CAPSULE = PROBLEMS / "horizontal_translation.yaml"
 ALWAYS = {"result.json", "task.yaml", "motion.npz", "object.urdf"}
 OF_A_HAND = {"hand.urdf", "scene.xml", "viewer.html"}
 # Two fingers carry a ball 1.5 cm to the side, above a palm that looks up.
-BALL = """
-name: ball
-object: {mass: 0.1, shapes: [{sphere: {center: [0, 0, 0], radius: 0.03}}]}
-palm: {radius: 0.06, position: [0, 0, 0], facing: [0, 0, 1], up: [1, 0, 0]}
-motion: [{at: 0, position: [0, 0, 0.09]}, {at: 0.6, position: [0, 0.015, 0.09]}]
-fingers: {left: {touches: [0, -0.03, 0]}, right: {touches: [0, 0.03, 0]}}
-friction: 0.5
-keyframes_between: 1
-search: {trials: 2, recombinations: 1, max_joints: 2}
-"""
-
-
+BALL = f"name: ball{example.BALL}search: {{trials: 2, recombinations: 1, max_joints: 2}}\n"
 LIMITS_IN_METRES = ("goal_position", "gap", "gap_between", "slip", "penetration")
 
 
@@ -136,6 +126,14 @@ def changed(*changes: str) -> str:
     return text
 
 
+def told_of(design: Design, pattern: str) -> re.Match[str]:
+    """The match of a pattern at the start of the reason why a design is not certified."""
+    assert design.status in ("feasible", "failed")
+    told = re.match(pattern, design.reason)
+    assert told is not None, design.reason
+    return told
+
+
 def farthest_contact(text: str, contact: int) -> float:
     """Larger distance, m, at the two goals of a floating contact and the palm's disc of 6 cm at the origin."""
     motion = solve(parse_task(text), jobs=1, until="floating").motion
@@ -186,13 +184,11 @@ def test_a_contact_out_of_reach_fails_the_task(
 def test_motors_too_weak_are_named_with_what_they_must_give(tmp_path: Path) -> None:
     text = changed("actuator: {torque: 0.0005, speed: 5}")
     design = solve(parse_task(text), jobs=1, out=tmp_path)
-    assert design.status in ("feasible", "failed")
-    told = re.match(
+    told = told_of(
+        design,
         r"joint finger([01])_joint([01]) of finger '(left|right)' needs ([\d.]+) N·m at .* however .*, and the motors "
         r"give 0\.0005 N·m; try stronger motors \(actuator\.torque\)",
-        design.reason,
     )
-    assert told is not None, design.reason
     assert ["left", "right"][int(told[1])] == told[3]
     # Each finger bears half the weight by friction of 0.5 at least, 9 cm up from its joint: most of 0.1 N·m at worst.
     assert 0.01 < float(told[4]) < 0.1
@@ -210,14 +206,11 @@ def test_motors_too_weak_are_named_with_what_they_must_give(tmp_path: Path) -> N
 
 def test_motors_too_slow_are_named_first() -> None:
     text = changed("actuator: {torque: 1, speed: 0.1}")
-    design = solve(parse_task(text), jobs=1)
-    assert design.status in ("feasible", "failed")
-    told = re.match(
+    told = told_of(
+        solve(parse_task(text), jobs=1),
         r"joint finger[01]_joint[01] of finger '(left|right)' turns with ([\d.]+) rad/s at .* in the motion found, "
         r"and the motors give 0\.1 rad/s; try faster motors",
-        design.reason,
     )
-    assert told is not None, design.reason
     # 15 mm in 0.6 s, at 1.5 times the mean in the middle, on a lever of 12 cm at most.
     assert float(told[2]) > 0.015 / 0.6 / 0.12
 
@@ -292,14 +285,12 @@ def test_almost_no_friction_is_named_with_what_would_do(tmp_path: Path) -> None:
     text = CAPSULE.read_text().replace("friction: 0.6", "friction: 0.05")
     task = parse_task(text + "search: {trials: 2, recombinations: 1, max_joints: 2}\n")
     design = solve(task, jobs=1, out=tmp_path)
-    assert design.status in ("feasible", "failed")
     # The thumb, alone on its side, bears half the weight: it presses with 0.5 / 0.05 weights, with 2 at 0.25.
-    told = re.match(
+    told = told_of(
+        design,
         r"at .* the contacts hold the object with friction 0\.05 only if they press with ([\d.]+) weights and more; "
         r"try friction of ([\d.]+) or more, with which 2 weights would do",
-        design.reason,
     )
-    assert told is not None, design.reason
     assert float(told[1]) == pytest.approx(10, rel=0.05)
     assert float(told[2]) == pytest.approx(0.25, rel=0.05)
     assert "finger '" not in design.reason.split(". ")[0]
