@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -29,6 +30,7 @@ def explore(
     jobs: int | None = None,
     until: str = "refine",
     out: Path | str | None = None,
+    executor: Executor | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> list[Alternative]:
     """Design hands for a task from several seeds, one after the other, and rank them.
@@ -46,6 +48,7 @@ def explore(
             in ``out`` itself, the ranking in ``alternatives/ranking.json`` and a menu of the distinct hands in their
             pages. At the end the folders of hands that are not kept are removed; ``solve`` with that seed gives them
             again.
+        executor: where trials run, in place of processes on this machine, as for ``solve``.
         progress: told what is being done; its times count from the start of the first seed.
 
     Returns:
@@ -72,7 +75,7 @@ def explore(
         folder = None if out is None else seed_folder(out, seed)
         told = _within(report, seed, time.perf_counter() - began)
         try:
-            designs[seed] = solve(task, seed=seed, jobs=jobs, until=until, out=folder, progress=told)
+            designs[seed] = solve(task, seed=seed, jobs=jobs, until=until, out=folder, executor=executor, progress=told)
         except _BROKEN_OFF as error:
             errors.append(error)
             if len(errors) == len(seeds):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import Executor
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from casadi_hands.pipeline.judge import Judge
 from casadi_hands.pipeline.record import STAGES, Progress, Record
 from casadi_hands.pipeline.steps import adopt, prepare_search, run_floating, run_search, run_whole_hand
 from casadi_hands.pipeline.warm import as_floating, kept_margin, warm_start
-from casadi_hands.search.work import processes
+from casadi_hands.search.work import processes, start_up
 from casadi_hands.stages.model import build_model
 from casadi_hands.task import Task
 
@@ -28,6 +29,7 @@ def solve(
     until: str = "refine",
     out: Path | None = None,
     start: Path | None = None,
+    executor: Executor | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> Design:
     """Design a hand for a task.
@@ -40,6 +42,8 @@ def solve(
         out: folder that is written after every stage, so that nothing computed is lost.
         start: folder of an earlier result of nearly the same task. Its hand and motion are refined for the task as it
             is now; only where that gives no certified hand are all stages run, and the better of both is kept.
+        executor: where trials run, in place of processes on this machine; the design does not depend on it. One thread
+            of a process runs a trial at a time, so threads gain nothing. ``jobs`` is then for the replays only.
         progress: told what is being done.
 
     Returns:
@@ -58,11 +62,11 @@ def solve(
         task = task.model_copy(update={"search": task.search.model_copy(update={"seed": seed})})
     jobs = jobs or os.cpu_count() or 1
     record = Record(task, out, progress or (lambda _: None))
-    with processes(jobs) as executor:
+    with processes(jobs) if executor is None else nullcontext(executor) as workers:
         best = None if start is None else _refine_again(record, start, jobs)
         if best is not None and serves(best[1], best[0][1]):
             return record.keep(best[1])
-        return record.keep(_run(record, until, executor, jobs, best))
+        return record.keep(_run(record, until, workers, jobs, best))
 
 
 def _refine_again(record: Record, start: Path, jobs: int) -> Ranked:
@@ -81,6 +85,8 @@ def _refine_again(record: Record, start: Path, jobs: int) -> Ranked:
 
 def _run(record: Record, until: str, executor: Executor | None, jobs: int, best: Ranked | None) -> Design:
     """All stages, to the last one asked for; ``best`` is a design there is already."""
+    if executor is not None and until != "floating":
+        start_up(executor, jobs)
     model = build_model(record.task)
     floating = run_floating(record, model)
     model = floating.model

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -61,9 +62,11 @@ def ranking(folder: Path) -> list[dict[str, Any]]:
 def test_the_best_is_in_the_folder_and_the_distinct_ones_beside_it(solves, tmp_path) -> None:
     worse, best = certified(shifted(0.03), friction_use=0.8), certified()
     calls = solves({4: worse, 5: best, 6: certified(shifted(0.001), friction_use=0.7)})
-    found = explore(example_task(), seeds=range(4, 7), jobs=1, until="whole_hand", out=tmp_path)
+    workers = ThreadPoolExecutor(1)
+    found = explore(example_task(), seeds=range(4, 7), jobs=1, until="whole_hand", out=tmp_path, executor=workers)
     assert [(one.seed, one.kept, one.like) for one in found] == [(5, True, None), (6, False, 5), (4, True, None)]
-    assert calls[1] == {"seed": 5, "out": tmp_path / "alternatives/seed5", "jobs": 1, "until": "whole_hand"}
+    settings = {"jobs": 1, "until": "whole_hand", "executor": workers}
+    assert calls[1] == {"seed": 5, "out": tmp_path / "alternatives/seed5", **settings}
     assert Design.load(tmp_path).hand == best.hand
     assert {path.name for path in (tmp_path / "alternatives").iterdir()} == {"seed4", "seed5", "ranking.json"}
     for name in ("result.json", "motion.npz", "hand.urdf", "scene.xml"):

@@ -1,0 +1,111 @@
+"""A dask.distributed cluster as the place where trials run."""
+
+from __future__ import annotations
+
+import asyncio
+import importlib.metadata
+import os
+import re
+from collections.abc import Iterator, Mapping
+from concurrent.futures import CancelledError, Executor
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from casadi_hands.errors import SolveError
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+PATIENCE = 5.0
+"""s that a scheduler may take to answer, and then again its workers to turn up."""
+_DECIDE_NUMBERS = ("casadi-hands", "casadi", "pin", "numpy", "scipy")
+
+
+@contextmanager
+def cluster(address: str) -> Iterator[Executor]:
+    """An executor of the workers of a dask.distributed scheduler; what has not begun is cancelled at the end.
+
+    Args:
+        address: ``dask://HOST:PORT``.
+
+    Raises:
+        SolveError: the address is of another form, dask.distributed is not installed, nobody answers, a worker
+            could give other numbers than this machine, or the cluster loses a trial.
+    """
+    match = re.fullmatch(r"dask://([\w.-]+|\[[\da-fA-F:]+\]):(\d{1,5})", address)
+    if not match:
+        raise SolveError(f"executor: given {address!r}; allowed: dask://HOST:PORT")
+    try:
+        from distributed import KilledWorker
+    except ImportError as error:
+        raise SolveError(f"{address} needs dask.distributed; pip install 'casadi-hands[dask]'") from error
+    client = _connected(address, f"tcp://{match[1]}:{match[2]}")
+    try:
+        _check_workers(address, client)
+        # The same call twice is two calls, not one whose result is looked up.
+        yield client.get_executor(pure=False)
+    except (KilledWorker, CancelledError) as error:
+        raise SolveError(f"{address} has lost a trial, with the worker or the scheduler: {error}") from error
+    finally:
+        client.close()
+
+
+def _connected(address: str, tcp: str) -> Client:
+    """A client of a scheduler that answers and has workers.
+
+    Raises:
+        SolveError: it does not answer in time, or has none.
+    """
+    from distributed import Client
+
+    try:
+        # A client would wait without end for one that takes the connection and says nothing.
+        asyncio.run(asyncio.wait_for(_greet(tcp), PATIENCE))
+        client = Client(tcp, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise SolveError(f"{address}: no dask scheduler answers there") from error
+    try:
+        client.wait_for_workers(1, timeout=PATIENCE)
+    except TimeoutError as error:
+        client.close()
+        raise SolveError(f"{address}: this cluster has no workers") from error
+    return client
+
+
+async def _greet(tcp: str) -> None:
+    from distributed.comm.core import connect
+
+    comm = await connect(tcp, timeout=PATIENCE)
+    await comm.close()
+
+
+def _check_workers(address: str, client: Client) -> None:
+    """Refuse a cluster with a worker that could crash, or give other numbers than this machine.
+
+    Raises:
+        SolveError: there is one; the message says how to start it.
+    """
+    start = f"start workers with: OMP_NUM_THREADS=1 dask worker {address[7:]} --nthreads 1 --nworkers N"
+    for worker, threads in client.nthreads().items():
+        if threads != 1:
+            raise SolveError(
+                f"{address}: worker {worker} has {threads} threads, and IPOPT can run in one thread of a process only; "
+                f"{start}"
+            )
+    answers: Mapping[str, Any] = client.run(surroundings, on_error="return")
+    here = surroundings()["versions"]
+    for worker, answer in answers.items():
+        if isinstance(answer, BaseException):
+            raise SolveError(f"{address}: worker {worker} cannot run casadi-hands: {answer}") from answer
+        if answer["versions"] != here:
+            there = answer["versions"]
+            differing = [f"{name} {there[name]} (here {here[name]})" for name in here if there[name] != here[name]]
+            raise SolveError(f"{address}: worker {worker} has other versions: {', '.join(differing)}")
+        if answer["threads"] != "1":
+            raise SolveError(f"{address}: worker {worker} may use several threads of linear algebra; {start}")
+
+
+def surroundings() -> dict[str, Any]:
+    """What decides the numbers that a process gives: versions, and the threads of linear algebra it is told to use."""
+    versions = {name: importlib.metadata.version(name) for name in _DECIDE_NUMBERS}
+    return {"versions": versions, "threads": os.environ.get("OMP_NUM_THREADS")}
