@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from contextlib import ExitStack
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -81,6 +82,15 @@ def solve(
         ),
     ] = 1,
     jobs: Jobs = None,
+    executor: Annotated[
+        str | None,
+        typer.Option(
+            metavar="dask://HOST:PORT",
+            help="Run the search on a dask.distributed cluster, with the same result; --jobs is then for the replays. "
+            "Needs distributed: pip install 'casadi-hands\\[dask]'",
+            show_default="processes here",
+        ),
+    ] = None,
     until: Annotated[Stage, typer.Option(help="Stop after this stage and write what there is.")] = Stage.REFINE,
 ) -> None:
     """Design a hand for a task.
@@ -103,10 +113,12 @@ def solve(
         complete = any(folder.glob("result.json")) or any(folder.glob("alternatives/*/result.json"))
         reporter.note(f"stopped; {f'what was computed is in {folder}' if complete else 'no stage was complete'}")
 
-    with leave_on_interrupt(stopped), reporter:
+    with leave_on_interrupt(stopped), reporter, ExitStack() as stack:
         # Within the reporter, because CasADi and Pinocchio take seconds to load.
         from casadi_hands import alternatives, pipeline
+        from casadi_hands.search.cluster import cluster
 
+        workers = stack.enter_context(cluster(executor)) if executor else None
         if seeds > 1:
             first = problem.search.seed if seed is None else seed
             ranked = alternatives.explore(
@@ -115,6 +127,7 @@ def solve(
                 jobs=jobs,
                 until=until.value,
                 out=folder,
+                executor=workers,
                 progress=reporter.progress,
             )
             design = ranked[0].design
@@ -122,7 +135,13 @@ def solve(
             ranked = []
             alternatives.remove_alternatives(folder)
             design = pipeline.solve(
-                problem, seed=seed, jobs=jobs, until=until.value, out=folder, progress=reporter.progress
+                problem,
+                seed=seed,
+                jobs=jobs,
+                until=until.value,
+                out=folder,
+                executor=workers,
+                progress=reporter.progress,
             )
     console = Console()
     console.print(design_summary(design, folder))

@@ -38,7 +38,7 @@ def cluster(address: str) -> Iterator[Executor]:
     try:
         from distributed import KilledWorker
     except ImportError as error:
-        raise SolveError(f"{address} needs dask.distributed; pip install 'casadi-hands[dask]'") from error
+        raise SolveError(f"{address} needs dask.distributed: pip install 'casadi-hands[dask]'") from error
     client = _connected(address, f"tcp://{match[1]}:{match[2]}")
     try:
         _check_workers(address, client)
