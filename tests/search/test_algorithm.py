@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Executor
 
 import numpy as np
 import pytest
@@ -140,12 +141,12 @@ def test_records_and_words(monkeypatch: pytest.MonkeyPatch) -> None:
     assert words[2] == "finger left, 1 joint(s), trial 3/3, best score 0.500"
 
 
-def for_real(seed: int = 4) -> Found:
-    return search(ball_target(), trials=3, recombinations=2, max_joints=2, seed=seed).run()
+def search_ball(executor: Executor | None, progress: Callable[[str], None] = lambda _: None) -> Found:
+    return search(ball_target(), progress, trials=3, recombinations=4, max_joints=2, executor=executor).run()
 
 
 def test_a_small_search_for_real_grows_both_fingers_and_is_repeatable() -> None:
-    one, other = for_real(), for_real()
+    one, other = search_ball(None), search_ball(None)
     # One joint cannot press along the motion and lift: two are needed.
     assert one.candidates[0].joints == (2, 2)
     assert one.candidates[0].hand.solution.objective == other.candidates[0].hand.solution.objective

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import time
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 import pytest
 
-from casadi_hands.search.work import combine_fingers, design_finger, processes, run_all
+from casadi_hands.search.work import combine_fingers, design_finger, processes, run_all, start_up
 from casadi_hands.stages.synthesis import Synthesised
 from tests.search.example import ball_target, ball_task
+from tests.search.test_algorithm import search_ball
 
 
 def slowly(seconds: float, value: int) -> int:
@@ -26,6 +30,35 @@ def failing(value: int) -> int:
     if value == 1:
         raise ValueError("one")
     return value
+
+
+class Recording(Executor):
+    """One thread, and what it was given."""
+
+    def __init__(self) -> None:
+        self.pool, self.futures = ThreadPoolExecutor(1), list[Future[Any]]()
+
+    def submit(self, function: Any, /, *arguments: Any, **named: Any) -> Future[Any]:
+        self.futures.append(self.pool.submit(function, *arguments, **named))
+        return self.futures[-1]
+
+
+def interrupt(*_: object) -> None:
+    raise KeyboardInterrupt
+
+
+class Busy:
+    """Counts the threads that are in it."""
+
+    inside = most = 0
+
+    @classmethod
+    def enter(cls, value: int) -> int:
+        cls.inside += 1
+        cls.most = max(cls.most, cls.inside)
+        time.sleep(0.02)
+        cls.inside -= 1
+        return value
 
 
 def same(one: Synthesised, other: Synthesised) -> None:
@@ -74,3 +107,36 @@ def test_one_job_is_this_process_and_the_environment_is_left_as_it_was(monkeypat
         assert os.environ["OMP_NUM_THREADS"] == "1"
     assert os.environ["OMP_NUM_THREADS"] == "7"
     assert "MKL_NUM_THREADS" not in os.environ
+
+
+def test_any_executor_serves_and_a_process_runs_one_trial_at_a_time() -> None:
+    Busy.inside = Busy.most = 0
+    with ThreadPoolExecutor(3) as threads_of_one:
+        found = run_all(threads_of_one, Busy.enter, [(value,) for value in range(9)], lambda *_: None)
+    assert found == list(range(9))
+    assert Busy.most == 1
+
+
+def test_a_search_in_a_thread_finds_the_hand_that_it_finds_here() -> None:
+    words: list[str] = []
+    with ThreadPoolExecutor(1) as executor:
+        away = search_ball(executor, words.append)
+    here = search_ball(None)
+    for one, other in zip(away.candidates, here.candidates, strict=True):
+        same(one.hand, other.hand)
+    assert any("trial 3/3" in word for word in words)
+
+
+def test_an_interruption_cancels_what_has_not_begun() -> None:
+    executor = Recording()
+    with executor.pool, pytest.raises(KeyboardInterrupt):
+        run_all(executor, slowly, [(0.05, value) for value in range(20)], interrupt)
+    assert 1 <= sum(future.done() and not future.cancelled() for future in executor.futures) < 5
+    assert all(future.done() for future in executor.futures)
+
+
+def test_workers_start_before_there_is_work() -> None:
+    with processes(2) as executor:
+        assert executor is not None
+        start_up(executor, 2)
+        assert len(multiprocessing.active_children()) == 2
