@@ -62,7 +62,8 @@ def _connected(address: str, tcp: str) -> Client:
         # A client would wait without end for one that takes the connection and says nothing.
         asyncio.run(asyncio.wait_for(_greet(tcp), PATIENCE))
         client = Client(tcp, timeout=PATIENCE, set_as_default=False)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, MemoryError) as error:
+        # MemoryError, because what another kind of server says is read as the length of a message.
         raise SolveError(f"{address}: no dask scheduler answers there") from error
     try:
         client.wait_for_workers(1, timeout=PATIENCE)
