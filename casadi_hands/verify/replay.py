@@ -20,6 +20,7 @@ Why this is fair to a real hand, as ``scene.xml`` has it:
 from __future__ import annotations
 
 import multiprocessing
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -70,31 +71,7 @@ def replay(directory: str | Path, perturbation: Perturbation | None = None, obse
         DesignError: the folder is incomplete, or ``scene.xml`` is not of this hand.
         HandsError: MuJoCo is not installed or cannot be loaded.
     """
-    folder = read_folder(directory)
-    perturbation = perturbation or Perturbation()
-    scene = Simulation(folder, perturbation)
-    plan = Plan(folder, scene.step)
-    scene.settle(plan, observer)
-    errors = np.empty((len(plan) - 1, 2))
-    for i in range(len(plan) - 1):
-        pushed = perturbation.push_start <= i * scene.step < perturbation.push_end
-        scene.play(plan, i, np.asarray(perturbation.push) if pushed else np.zeros(3), observer)
-        errors[i] = plan.error(i + 1, *scene.object_pose())
-    due = [c for c in range(len(folder.motion.contact_names)) if folder.motion.contact_active[-1, c]]
-    lost = [c for c in due if not scene.touches(folder.motion.contact_link[c])]
-    gone = errors[:, 0].max() > DROP * folder.length
-    mean, largest, final = (values.tolist() for values in (errors.mean(axis=0), errors.max(axis=0), errors[-1]))
-    return Replay(
-        position_mean=mean[0],
-        position_max=largest[0],
-        position_final=final[0],
-        angle_mean=mean[1],
-        angle_max=largest[1],
-        angle_final=final[1],
-        dropped=bool(gone or (due and len(lost) == len(due))),
-        lost_contacts=tuple(folder.motion.contact_names[c] for c in lost),
-        perturbation=perturbation,
-    )
+    return _Player(directory).play(perturbation or Perturbation(), observer)
 
 
 def replay_many(directory: str | Path, n: int, seed: int = 0, jobs: int = 1) -> list[Replay]:
@@ -112,7 +89,49 @@ def replay_many(directory: str | Path, n: int, seed: int = 0, jobs: int = 1) -> 
     folder = read_folder(directory)
     drawn = [draw_perturbation(folder, seed, number) for number in range(n)]
     if jobs == 1:
-        return [replay(directory, each) for each in drawn]
+        return _replay_all(directory, drawn)
+    shares = [drawn[k::jobs] for k in range(min(jobs, n))]
     # Forking a process that runs threads (a progress display, a solver) can hang it.
     with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
-        return list(pool.map(partial(replay, directory), drawn))
+        played = list(pool.map(partial(_replay_all, directory), shares))
+    return [played[k % jobs][k // jobs] for k in range(n)]
+
+
+def _replay_all(directory: str | Path, perturbations: Sequence[Perturbation]) -> list[Replay]:
+    """Play the motion of a result folder once for each perturbation."""
+    player = _Player(directory)
+    return [player.play(each) for each in perturbations]
+
+
+class _Player:
+    """A result folder and, once it has been played, its plan, which no perturbation changes."""
+
+    def __init__(self, directory: str | Path) -> None:
+        self.folder = read_folder(directory)
+        self.plan: Plan | None = None
+
+    def play(self, perturbation: Perturbation, observer: Observer | None = None) -> Replay:
+        """Play the motion from its start to its end."""
+        folder, scene = self.folder, Simulation(self.folder, perturbation)
+        self.plan = plan = self.plan or Plan(folder, scene.step)
+        scene.settle(plan, observer)
+        errors = np.empty((len(plan) - 1, 2))
+        for i in range(len(plan) - 1):
+            pushed = perturbation.push_start <= i * scene.step < perturbation.push_end
+            scene.play(plan, i, np.asarray(perturbation.push) if pushed else np.zeros(3), observer)
+            errors[i] = plan.error(i + 1, *scene.object_pose())
+        due = [c for c in range(len(folder.motion.contact_names)) if folder.motion.contact_active[-1, c]]
+        lost = [c for c in due if not scene.touches(folder.motion.contact_link[c])]
+        gone = errors[:, 0].max() > DROP * folder.length
+        mean, largest, final = (values.tolist() for values in (errors.mean(axis=0), errors.max(axis=0), errors[-1]))
+        return Replay(
+            position_mean=mean[0],
+            position_max=largest[0],
+            position_final=final[0],
+            angle_mean=mean[1],
+            angle_max=largest[1],
+            angle_final=final[1],
+            dropped=bool(gone or (due and len(lost) == len(due))),
+            lost_contacts=tuple(folder.motion.contact_names[c] for c in lost),
+            perturbation=perturbation,
+        )
