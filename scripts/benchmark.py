@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 from isolated import Outcome, isolated
 from peers import Attempt, Build, Method, Posed, Run, by_scipy, opti, ours, recorded_solves
-from profiled import KINDS, profiled_solve
+from profiled import KINDS, cores_used, profiled_solve
 from shared import NOTHING, options_of, write_table
 
 from casadi_hands import load_task
@@ -94,6 +94,7 @@ def main() -> None:
         if given.profile:
             spent += spending(task)
             write_table(SPENT, spent, given.out / "profile.md")
+            print(two_processes(task))
     print(f"cold start: {cold_start(given.tasks[0])}")
 
 
@@ -222,6 +223,15 @@ def spending(task_file: Path) -> list[list[str]]:
     text = f"all, {profile['status']}, {outcome.megabytes:.0f} MB"
     start = f"{profile['total']:.1f} + {outcome.seconds - profile['total']:.1f} to start"
     return [*rows, [name, text, start, *counts, *shares(kinds, profile["total"])]]
+
+
+def two_processes(task_file: Path) -> str:
+    """How busy two processes keep two cores in stage 2."""
+    used = isolated(cores_used, task_file, limit=3600)
+    if used.value is None:
+        return f"{task_file}: two processes: {used.failure}"
+    got, asked = (f"{100 * share:.0f} %" for share in used.value)
+    return f"{task_file}: in stage 2 two processes ask for {asked} of two cores and get {got}"
 
 
 def shares(seconds: dict[str, float], whole: float) -> list[str]:

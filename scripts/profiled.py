@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
@@ -12,6 +13,7 @@ from unittest.mock import patch
 
 from casadi_hands import load_task, solve
 from casadi_hands.nlp import Options, Solution, Solver
+from casadi_hands.pipeline import Progress
 from casadi_hands.stages.floating import FloatingStage
 from casadi_hands.stages.refine import RefineStage
 from casadi_hands.stages.synthesis import SynthesisStage
@@ -107,3 +109,26 @@ def profiled_solve(task_file: Path, seed: int) -> dict[str, Any]:
         "iterations": dict(ledger.iterations),
         "solves": dict(ledger.solves),
     }
+
+
+def cores_used(task_file: Path) -> tuple[float, float]:
+    """Shares of two cores that two processes get, and ask for, during stage 2 of a solve.
+
+    What they ask for and do not get went to others on the machine. Needs Linux.
+    """
+    heard: list[tuple[float, float, float]] = []
+
+    def hear(news: Progress) -> None:
+        if news.stage == "synthesis":
+            heard.append((time.perf_counter(), *processor_time()))
+
+    solve(load_task(task_file), jobs=2, until="synthesis", progress=hear)
+    wall, got, waited = (last - first for first, last in zip(heard[0], heard[-1], strict=True))
+    return got / (2 * wall), (got + waited) / (2 * wall)
+
+
+def processor_time() -> tuple[float, float]:
+    """Seconds that this process's children have run, and have been ready to run without a processor."""
+    threads = [file for c in multiprocessing.active_children() for file in Path(f"/proc/{c.pid}/task").glob("*")]
+    spent = [tuple(map(int, (thread / "schedstat").read_text().split())) for thread in threads]
+    return 1e-9 * sum(each[0] for each in spent), 1e-9 * sum(each[1] for each in spent)

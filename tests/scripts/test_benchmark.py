@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
+import time
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +14,7 @@ from benchmark import PEERS, SPENT, compared, reached, shares, slowness
 from growth import ITERATIONS, Size, exponent, measure, task_of
 from isolated import Outcome, isolated
 from peers import Attempt, Run, recorded_solves
-from profiled import KINDS, Ledger
+from profiled import KINDS, Ledger, processor_time
 
 from casadi_hands import load_task
 from casadi_hands.stages.floating import FloatingStage
@@ -126,3 +129,30 @@ def _wait() -> None:
     import time
 
     time.sleep(60)
+
+
+def spin(pipe: Connection) -> None:
+    began = time.process_time()
+    while time.process_time() - began < 0.3:
+        pass
+    pipe.send(time.process_time())
+    pipe.recv()
+
+
+def test_processor_time_is_what_children_have_used() -> None:
+    context = multiprocessing.get_context("spawn")
+    pipes = [context.Pipe() for _ in range(2)]
+    children = [context.Process(target=spin, args=(theirs,)) for _, theirs in pipes]
+    try:
+        began = time.perf_counter()
+        for child in children:
+            child.start()
+        used = sum(ours.recv() for ours, _ in pipes)
+        got, waited = processor_time()
+        assert got == pytest.approx(used, abs=0.1)
+        assert 0 <= waited < 2 * (time.perf_counter() - began)
+    finally:
+        for ours, _ in pipes:
+            ours.send(None)
+        for child in children:
+            child.join()
