@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import importlib.metadata
+import logging
 import os
 import re
 from collections.abc import Iterator, Mapping
@@ -39,13 +40,15 @@ def cluster(address: str) -> Iterator[Executor]:
         from distributed import KilledWorker
     except ImportError as error:
         raise SolveError(f"{address} needs dask.distributed: pip install 'casadi-hands[dask]'") from error
+    # What ends the solve is told as one error; the client would log it with a traceback as well.
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     client = _connected(address, f"tcp://{match[1]}:{match[2]}")
     try:
         _check_workers(address, client)
         # The same call twice is two calls, not one whose result is looked up.
         yield client.get_executor(pure=False)
     except (KilledWorker, CancelledError) as error:
-        raise SolveError(f"{address} has lost a trial, with the worker or the scheduler: {error}") from error
+        raise SolveError(f"{address} has lost a trial: a worker died with it, or the scheduler is gone") from error
     finally:
         client.close()
 

@@ -29,6 +29,7 @@ from tests.export.example import TASK, example_design
 from tests.verify.fixture import Scene, carried
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
+CAPSULE = PROBLEMS / "horizontal_translation.yaml"
 
 
 @dataclass(frozen=True)
@@ -112,6 +113,7 @@ def test_stages_are_those_of_the_pipeline() -> None:
     [
         (["check", "no.yaml"], "no.yaml: no such file"),
         (["solve", "no.yaml"], "no.yaml: no such file"),
+        (["solve", str(CAPSULE), "--executor", "here:1"], "executor: given 'here:1'; allowed: dask://HOST:PORT"),
         (["audit", "no-folder"], "no-folder: not a directory"),
         (["view", "no-folder"], "no-folder: no viewer.html here"),
     ],

@@ -225,11 +225,18 @@ def die(_: int) -> None:
 
 def test_a_trial_that_takes_its_workers_down_is_one_message() -> None:
     with LocalCluster(n_workers=1, threads_per_worker=1, processes=True, dashboard_address=":0") as fragile:
-        address = address_of(fragile)
         fragile.scheduler.allowed_failures = 0
-        lost = "has lost a trial, with the worker or the scheduler"
-        with pytest.raises(SolveError, match=lost), cluster(address) as executor:
+        with pytest.raises(SolveError, match="has lost a trial"), cluster(address_of(fragile)) as executor:
             run_all(executor, die, [(0,)], lambda *_: None)
+
+
+def test_a_scheduler_that_goes_away_is_one_message(tmp_path: Path) -> None:
+    with LocalCluster(n_workers=1, threads_per_worker=1, processes=True, dashboard_address=":0") as fleeting:
+        leaving = threading.Thread(target=lambda: (wait(lambda: any(tmp_path.iterdir())), fleeting.close()))
+        leaving.start()
+        with pytest.raises(SolveError, match="the scheduler is gone"), cluster(address_of(fleeting)) as executor:
+            run_all(executor, note, [(tmp_path, 0, 3.0)], lambda *_: None)
+        leaving.join()
 
 
 @pytest.mark.slow
