@@ -81,6 +81,16 @@ def solve(
             "alternatives/, up to four distinct ones.",
         ),
     ] = 1,
+    start: Annotated[
+        Path | None,
+        typer.Option(
+            "--from",
+            metavar="DIR",
+            help="Refine the hand of an earlier result of nearly the same task, which takes seconds; only where that "
+            "gives no certified hand are all stages run.",
+            show_default=False,
+        ),
+    ] = None,
     jobs: Jobs = None,
     executor: Annotated[
         str | None,
@@ -103,6 +113,10 @@ def solve(
     from casadi_hands.cli.summary import alternatives_summary, design_summary
     from casadi_hands.task import load_task
 
+    if start is not None and (seeds > 1 or until is not Stage.REFINE):
+        raise typer.BadParameter(
+            "one hand is refined, to the end: give neither --seeds nor --until", param_hint="--from"
+        )
     problem = load_task(task)
     folder = out or Path("results") / task.stem
     reporter = Reporter(Console(stderr=True))
@@ -133,16 +147,20 @@ def solve(
             design = ranked[0].design
         else:
             ranked = []
-            alternatives.remove_alternatives(folder)
+            if start is None:
+                alternatives.remove_alternatives(folder)
             design = pipeline.solve(
                 problem,
                 seed=seed,
                 jobs=jobs,
                 until=until.value,
                 out=folder,
+                start=start,
                 executor=workers,
                 progress=reporter.progress,
             )
+            if start is not None:  # which may have been one of them
+                alternatives.remove_alternatives(folder)
     console = Console()
     console.print(design_summary(design, folder))
     if ranked:

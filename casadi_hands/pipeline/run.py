@@ -63,23 +63,25 @@ def solve(
     jobs = jobs or os.cpu_count() or 1
     record = Record(task, out, progress or (lambda _: None))
     with processes(jobs) if executor is None else nullcontext(executor) as workers:
-        best = None if start is None else _refine_again(record, start, jobs)
+        best = None if start is None else _refine_again(record, start)
         if best is not None and serves(best[1], best[0][1]):
             return record.keep(best[1])
         return record.keep(_run(record, until, workers, jobs, best))
 
 
-def _refine_again(record: Record, start: Path, jobs: int) -> Ranked:
+def _refine_again(record: Record, start: Path) -> Ranked:
     """The hand and the motion of an earlier result, refined for the task as it is now."""
     earlier, model = Design.load(start), build_model(record.task)
     whole, margin = warm_start(earlier, record.task, model), kept_margin(earlier)
     adopt(record, model, whole)
     judge = Judge(model, as_floating(model, whole))
-    design, _, drops = Refiner(record, model, judge, jobs).certify(whole, (), margin, near=True)
+    # Replays of one hand take about as long as other processes take to start.
+    design, _, drops = Refiner(record, model, judge, jobs=1).certify(whole, (), margin, near=True)
     record.update(stages=[{**run, "started_from": str(start)} for run in record.design.stages])
     if not serves(design, drops):
         why = design.reason or f"{drops} of {REPLAYS} replays dropped the object"
         record.say("refine", f"from the earlier result no hand serves: {why}; now all stages")
+        record.update(hand=None, motion=None, costs={})
     return ranked(design, drops)
 
 

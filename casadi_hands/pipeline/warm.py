@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
@@ -9,6 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from casadi_hands.design import Design, Finger, Hand, Motion
 from casadi_hands.errors import SolveError
+from casadi_hands.kinematics import finger_kinematics
 from casadi_hands.motion import eased, held, linear, nearest_exponential
 from casadi_hands.nlp import Solution
 from casadi_hands.pipeline.certify import AMPLE, FIRM, SMALL
@@ -23,6 +26,8 @@ from casadi_hands.task import Task
 
 Array = NDArray[np.float64]
 _NEARLY = 0.98  # margins are kept on surfaces whose kinks are rounded
+_STEPS = 4  # of Gauss and Newton
+_STIFF = 0.05  # half extents/rad, what keeps joints near their angles where that gains little
 _NOT_SOLVED = Solution({}, {}, 0.0, 0.0, {}, {}, "taken from an earlier result", 0, 0.0)
 
 
@@ -47,7 +52,12 @@ def warm_start(earlier: Design, task: Task, model: Model) -> WholeHand:
     if earlier.hand is None or earlier.motion is None:
         raise SolveError(_refused("it holds no hand with a motion", earlier))
     _check_structure(earlier, earlier.hand, task)
-    return _Warm(earlier, earlier.hand, earlier.motion, task, model).start()
+    old, motion = build_model(earlier.task), earlier.motion
+    was = _retold(earlier.hand, motion, old, model)
+    columns = [motion.contact_names.index(name) for name in model.contact_names]
+    on_link = motion.contact_point_link[:, columns] / model.units.length
+    on_link = np.tensordot(linear(motion.time, _stretched(old, model)), on_link, axes=1)
+    return _followed(was, _moved(was, task, old, model), on_link, old, model)
 
 
 def kept_margin(earlier: Design) -> Margin:
@@ -108,109 +118,141 @@ def _refused(why: str, earlier: Design) -> str:
     )
 
 
-class _Warm:
-    """The numbers of both tasks; lengths and forces of the earlier one in its SI or in its own units as named."""
+def _retold(hand: Hand, motion: Motion, old: Model, model: Model) -> WholeHand:
+    """The earlier motion as it was, at the samples and in the units of the new task; still of the old reference."""
+    when, length = _stretched(old, model), model.units.length
+    names = motion.contact_names
+    columns = [names.index(name) for name in (*model.contact_names, *(["ground"] if model.ground else []))]
+    between = linear(motion.time, when)
+    turns = np.array([pin.Quaternion(*q).matrix() for q in motion.object_orientation])
+    forces = np.einsum("sji,scj->sci", turns, motion.contact_force[:, columns]) / old.units.force
+    active = motion.contact_active[held(motion.time, when)][:, columns]
+    palms = np.array([pin.Quaternion(*q).matrix() for q in motion.base_orientation])
+    palm = _spline(motion.time, _vectors(palms @ palms[0].T))(when)
+    contacts = [model.contact_names.index(finger.name) for finger in hand.fingers]
+    joints, at = _spline(motion.time, motion.joint_angles)(when), model.schedule.keyframe_samples
+    fingers, angles = [], []
+    for i in np.argsort(contacts):
+        own = [motion.joint_names.index(f"finger{i}_joint{j}") for j in range(len(hand.fingers[i].links))]
+        angles.append(joints[:, own])
+        fingers.append(_seed(hand.fingers[i], joints[at][:, own], length))
+    path = [
+        _spline(motion.time, motion.object_position / length)(when),
+        _spline(motion.time, _vectors(turns @ pin.Quaternion(*old.reference).matrix().T))(when),
+    ]
+    return WholeHand(
+        fingers=tuple(fingers),
+        contacts=tuple(sorted(contacts)),
+        pose=np.hstack(path)[at],
+        angles=tuple(angles),
+        palm_position=_spline(motion.time, motion.base_position / length)(when),
+        palm_quaternion=np.array([quaternion(pin.exp3(v) @ palms[0]) for v in palm]),
+        position=path[0],
+        vector=path[1],
+        point=np.tensordot(between, motion.contact_point_object[:, columns] / length, axes=1),
+        force=np.tensordot(between, forces, axes=1) * active[:, :, None],
+        active=active,
+        solution=_NOT_SOLVED,
+    )
 
-    def __init__(self, earlier: Design, hand: Hand, motion: Motion, task: Task, model: Model) -> None:
-        self.hand, self.motion, self.task, self.model = hand, motion, task, model
-        self.old = build_model(earlier.task)
-        self.scale = self.old.units.length / model.units.length
-        self.when = _stretched(self.old, model)
 
-    def start(self) -> WholeHand:
-        """Everything at the samples of the new task."""
-        model, motion = self.model, self.motion
-        contacts = [model.contact_names.index(finger.name) for finger in self.hand.fingers]
-        order = np.argsort(contacts)
-        names = motion.contact_names
-        columns = [names.index(name) for name in (*model.contact_names, *(["ground"] if model.ground else []))]
-        turns = np.array([pin.Quaternion(*q).matrix() for q in motion.object_orientation])
-        forces = np.einsum("sji,scj->sci", turns, motion.contact_force[:, columns]) / self.old.units.force
-        active = motion.contact_active[held(motion.time, self.when)][:, columns]
-        position, vector = self._path(turns)
-        joints = _spline(motion.time, motion.joint_angles)(self.when)
-        angles = tuple(joints[:, self._joints(int(i))] for i in order)
-        at = model.schedule.keyframe_samples
-        palm_position, palm_quaternion = self._palm()
-        return WholeHand(
-            fingers=tuple(self._finger(self.hand.fingers[i], a[at]) for i, a in zip(order, angles, strict=True)),
-            contacts=tuple(contacts[i] for i in order),
-            pose=np.hstack([position, vector])[at],
-            angles=angles,
-            palm_position=palm_position,
-            palm_quaternion=palm_quaternion,
-            position=position,
-            vector=vector,
-            point=self._points(columns),
-            force=self._between(forces) * active[:, :, None],
-            active=active,
-            solution=_NOT_SOLVED,
+def _seed(finger: Finger, angles: Array, length: float) -> FingerSeed:
+    """A finger in units of ``length`` (m), with its joint angles at the keyframes."""
+    return FingerSeed(
+        base=np.array(finger.base[:2]) / length,
+        lengths=np.array([link.length for link in finger.links]) / length,
+        frames=np.array([frame_about(np.array(link.axis)) for link in finger.links]),
+        axes=np.zeros((len(finger.links), 2)),
+        angles=angles,
+        tips=np.zeros((0, 2)),
+    )
+
+
+def _moved(was: WholeHand, task: Task, old: Model, model: Model) -> WholeHand:
+    """The object's path, the palm's and the contacts on the object, moved by what the task moved."""
+    scale = old.units.length / model.units.length
+    goals = model.schedule.keyframes[list(model.schedule.goals)]
+    blend = linear(goals, eased(goals, model.schedule.samples))
+    vector = was.vector + blend @ (model.goal_vectors - old.goal_vectors)
+    position = was.position + blend @ (model.goal_positions - scale * old.goal_positions)
+    if model.tool is not None and old.tool is not None:
+        moved = model.tool - scale * old.tool
+        position = position - np.array([pin.exp3(v) @ moved for v in vector])
+    palm = model.palm_position, model.palm_quaternion
+    if task.palm.may_move:
+        before = _stretched(old, model)
+        given = linear(old.schedule.samples, before)
+        palm = was.palm_position + model.palm_position - scale * given @ old.palm_position, was.palm_quaternion
+    patches, before, capsules = model.patches, old.patches, model.capsules
+    fingers = [old.contact_names.index(name) for name in model.contact_names]
+    before = before[fingers]
+    if model.ground is not None and old.ground is not None:
+        patches, before = np.vstack([patches, model.ground.patch]), np.vstack([before, old.ground.patch])
+        capsules = np.vstack([capsules, model.ground.capsule])
+    points = was.point + patches - scale * before
+    return replace(
+        was,
+        pose=np.hstack([position, vector])[model.schedule.keyframe_samples],
+        palm_position=palm[0],
+        palm_quaternion=palm[1],
+        position=position,
+        vector=vector,
+        point=np.array([on_capsules(p, capsules, inward_normals(p, capsules)) for p in points]),
+    )
+
+
+def _followed(was: WholeHand, moved: WholeHand, on_link: Array, old: Model, model: Model) -> WholeHand:
+    """Joints turned so that links follow their contacts in the palm's frame, as far as they can.
+
+    Args:
+        was: the motion before it was moved.
+        moved: the motion after, with the joints of before.
+        on_link: (S, C, 3) contacts on the links, link frame.
+        old: of ``was``.
+        model: of ``moved``.
+    """
+    away = _in_palm(moved, model) - _in_palm(was, old)
+    fingers, angles = [], []
+    for i, (finger, contact) in enumerate(zip(moved.fingers, moved.contacts, strict=True)):
+        turned = np.array(
+            [_reach(finger, *row) for row in zip(moved.angles[i], on_link[:, contact], away[:, contact], strict=True)]
         )
+        angles.append(turned)
+        fingers.append(replace(finger, angles=turned[model.schedule.keyframe_samples]))
+    return replace(moved, fingers=tuple(fingers), angles=tuple(angles))
 
-    def _joints(self, finger: int) -> list[int]:
-        """Columns of a finger's joint angles."""
-        names = self.motion.joint_names
-        return [names.index(f"finger{finger}_joint{j}") for j in range(len(self.hand.fingers[finger].links))]
 
-    def _finger(self, finger: Finger, angles: Array) -> FingerSeed:
-        length = self.model.units.length
-        return FingerSeed(
-            base=np.array(finger.base[:2]) / length,
-            lengths=np.array([link.length for link in finger.links]) / length,
-            frames=np.array([frame_about(np.array(link.axis)) for link in finger.links]),
-            axes=np.zeros((len(finger.links), 2)),
-            angles=angles,
-            tips=np.zeros((0, 2)),
+def _reach(finger: FingerSeed, angles: Array, on_link: Array, away: Array) -> Array:
+    """Joint angles (n,) near given ones with which a point of the last link is ``away`` (3,) from where it was."""
+    function = finger_kinematics(finger.joints)
+    turned, target = angles, None
+    for _ in range(_STEPS):
+        *_, point, jacobian = (
+            np.asarray(value)
+            for value in function(np.append(finger.base, 0), finger.axis_vectors.T, finger.lengths, turned, on_link)
         )
+        target = point.ravel() + away if target is None else target
+        rows = np.vstack([jacobian, _STIFF * np.eye(finger.joints)])
+        step = np.linalg.lstsq(rows, np.append(target - point.ravel(), _STIFF * (angles - turned)), rcond=None)[0]
+        turned = turned + step
+    return turned
 
-    def _between(self, values: Array) -> Array:
-        """Values (S, ...) at the earlier samples, linear in between, at the new ones."""
-        return np.asarray(np.tensordot(linear(self.motion.time, self.when), values, axes=1))
 
-    def _path(self, turns: Array) -> tuple[Array, Array]:
-        """Position (S, 3) and rotation vector (S, 3) of the object: the earlier ones, moved by what goals moved."""
-        model, old, time = self.model, self.old, self.motion.time
-        reference = pin.Quaternion(*old.reference).matrix()
-        vectors = [np.zeros(3)]
-        for turn in turns:
-            vectors.append(nearest_exponential(turn @ reference.T, vectors[-1]))
-        position = _spline(time, self.motion.object_position / model.units.length)(self.when)
-        vector = _spline(time, np.array(vectors[1:]))(self.when)
-        goals = model.schedule.keyframes[list(model.schedule.goals)]
-        blend = linear(goals, eased(goals, model.schedule.samples))
-        position = position + blend @ (model.goal_positions - self.scale * old.goal_positions)
-        vector = vector + blend @ (model.goal_vectors - old.goal_vectors)
-        if model.tool is not None and old.tool is not None:
-            moved = model.tool - self.scale * old.tool
-            position = position - np.array([pin.exp3(v) @ moved for v in vector])
-        return position, vector
+def _in_palm(hand: WholeHand, model: Model) -> Array:
+    """Contact points (S, C, 3) in the palm's frame."""
+    reference = pin.Quaternion(*model.reference).matrix()
+    turns = np.array([pin.exp3(v) @ reference for v in hand.vector])
+    palms = np.array([pin.Quaternion(*q).matrix() for q in hand.palm_quaternion])
+    world = np.einsum("sij,scj->sci", turns, hand.point) + (hand.position - hand.palm_position)[:, None]
+    return np.asarray(np.einsum("sji,scj->sci", palms, world))
 
-    def _palm(self) -> tuple[Array, Array]:
-        """Palm's position (S, 3) and quaternion (S, 4): the task's, and where it may move, off it as it was."""
-        model, old, motion = self.model, self.old, self.motion
-        if not self.task.palm.may_move:
-            return model.palm_position, model.palm_quaternion
-        off = motion.base_position / old.units.length - old.palm_position
-        turned = []
-        for was, given in zip(motion.base_orientation, old.palm_quaternion, strict=True):
-            turned.append(pin.log3(pin.Quaternion(*was).matrix() @ pin.Quaternion(*given).matrix().T))
-        off, turned = (_spline(motion.time, values)(self.when) for values in (self.scale * off, np.array(turned)))
-        given = [pin.Quaternion(*q).matrix() for q in model.palm_quaternion]
-        quaternions = [quaternion(pin.exp3(v) @ g) for v, g in zip(turned, given, strict=True)]
-        return model.palm_position + off, np.array(quaternions)
 
-    def _points(self, columns: list[int]) -> Array:
-        """Contact points (S, C, 3) on the object as it is now, moved by what the task's contacts moved."""
-        model, old = self.model, self.old
-        patches, before, capsules = model.patches, old.patches, model.capsules
-        if model.ground is not None and old.ground is not None:
-            patches, before = np.vstack([patches, model.ground.patch]), np.vstack([before, old.ground.patch])
-            capsules = np.vstack([capsules, model.ground.capsule])
-        fingers = [old.contact_names.index(name) for name in model.contact_names]
-        before = before[[*fingers, *range(len(fingers), len(before))]]
-        points = self._between(self.motion.contact_point_object[:, columns] / model.units.length)
-        points = points + patches - self.scale * before
-        return np.array([on_capsules(p, capsules, inward_normals(p, capsules)) for p in points])
+def _vectors(rotations: Array) -> Array:
+    """Rotation vectors (S, 3) of rotations (S, 3, 3), continuous from one to the next."""
+    vectors = [np.zeros(3)]
+    for rotation in rotations:
+        vectors.append(nearest_exponential(rotation, vectors[-1]))
+    return np.array(vectors[1:])
 
 
 def _stretched(old: Model, new: Model) -> Array:
