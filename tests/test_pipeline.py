@@ -239,6 +239,27 @@ def translated(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
+def test_an_edited_task_is_certified_from_the_earlier_result_by_refining_alone(carried: Path, tmp_path: Path) -> None:
+    # The second goal 5 mm farther, a heavier ball and another friction.
+    text = changed("[0, 0.015, 0.09] -> [0, 0.02, 0.09]", "mass: 0.1 -> mass: 0.12", "friction: 0.5 -> friction: 0.55")
+    design = solve(parse_task(text), jobs=1, out=tmp_path, start=carried)
+    assert design.status == "certified", design.reason
+    assert audit(tmp_path).certified
+    assert {run["stage"] for run in design.stages} == {"refine"}
+    assert {run["started_from"] for run in design.stages} == {str(carried)}
+    assert set(design.seconds) == {"refine", "total"}
+    before = Design.load(carried)
+    assert design.hand is not None
+    assert before.hand is not None
+    assert design.hand.joint_names == before.hand.joint_names
+    assert design.motion is not None
+    assert np.linalg.norm(design.motion.object_position[-1] - [0, 0.02, 0.09]) <= design.task.limits.goal_position
+    again = tmp_path / "again"
+    solve(parse_task(text), jobs=2, out=again, start=carried)
+    assert (again / "motion.npz").read_bytes() == (tmp_path / "motion.npz").read_bytes()
+
+
+@pytest.mark.slow
 def test_a_capsule_s_translation_is_certified_with_two_joints_a_finger(translated: Path) -> None:
     design, verdict = Design.load(translated), audit(translated)
     assert verdict.reasons == []

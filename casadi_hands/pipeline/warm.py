@@ -124,11 +124,9 @@ def _retold(hand: Hand, motion: Motion, old: Model, model: Model) -> WholeHand:
     names = motion.contact_names
     columns = [names.index(name) for name in (*model.contact_names, *(["ground"] if model.ground else []))]
     between = linear(motion.time, when)
-    turns = np.array([pin.Quaternion(*q).matrix() for q in motion.object_orientation])
+    turns = np.array([_matrix(q) for q in motion.object_orientation])
     forces = np.einsum("sji,scj->sci", turns, motion.contact_force[:, columns]) / old.units.force
     active = motion.contact_active[held(motion.time, when)][:, columns]
-    palms = np.array([pin.Quaternion(*q).matrix() for q in motion.base_orientation])
-    palm = _spline(motion.time, _vectors(palms @ palms[0].T))(when)
     contacts = [model.contact_names.index(finger.name) for finger in hand.fingers]
     joints, at = _spline(motion.time, motion.joint_angles)(when), model.schedule.keyframe_samples
     fingers, angles = [], []
@@ -138,7 +136,7 @@ def _retold(hand: Hand, motion: Motion, old: Model, model: Model) -> WholeHand:
         fingers.append(_seed(hand.fingers[i], joints[at][:, own], length))
     path = [
         _spline(motion.time, motion.object_position / length)(when),
-        _spline(motion.time, _vectors(turns @ pin.Quaternion(*old.reference).matrix().T))(when),
+        _spline(motion.time, _vectors(turns @ _matrix(old.reference).T))(when),
     ]
     return WholeHand(
         fingers=tuple(fingers),
@@ -146,7 +144,7 @@ def _retold(hand: Hand, motion: Motion, old: Model, model: Model) -> WholeHand:
         pose=np.hstack(path)[at],
         angles=tuple(angles),
         palm_position=_spline(motion.time, motion.base_position / length)(when),
-        palm_quaternion=np.array([quaternion(pin.exp3(v) @ palms[0]) for v in palm]),
+        palm_quaternion=np.array([quaternion(r) for r in _turns(motion.time, motion.base_orientation, when)]),
         position=path[0],
         vector=path[1],
         point=np.tensordot(between, motion.contact_point_object[:, columns] / length, axes=1),
@@ -176,20 +174,8 @@ def _moved(was: WholeHand, task: Task, old: Model, model: Model) -> WholeHand:
     vector = was.vector + blend @ (model.goal_vectors - old.goal_vectors)
     position = was.position + blend @ (model.goal_positions - scale * old.goal_positions)
     if model.tool is not None and old.tool is not None:
-        moved = model.tool - scale * old.tool
-        position = position - np.array([pin.exp3(v) @ moved for v in vector])
-    palm = model.palm_position, model.palm_quaternion
-    if task.palm.may_move:
-        before = _stretched(old, model)
-        given = linear(old.schedule.samples, before)
-        palm = was.palm_position + model.palm_position - scale * given @ old.palm_position, was.palm_quaternion
-    patches, before, capsules = model.patches, old.patches, model.capsules
-    fingers = [old.contact_names.index(name) for name in model.contact_names]
-    before = before[fingers]
-    if model.ground is not None and old.ground is not None:
-        patches, before = np.vstack([patches, model.ground.patch]), np.vstack([before, old.ground.patch])
-        capsules = np.vstack([capsules, model.ground.capsule])
-    points = was.point + patches - scale * before
+        position = position - np.array([pin.exp3(v) @ (model.tool - scale * old.tool) for v in vector])
+    palm = _moved_palm(was, old, model) if task.palm.may_move else (model.palm_position, model.palm_quaternion)
     return replace(
         was,
         pose=np.hstack([position, vector])[model.schedule.keyframe_samples],
@@ -197,8 +183,31 @@ def _moved(was: WholeHand, task: Task, old: Model, model: Model) -> WholeHand:
         palm_quaternion=palm[1],
         position=position,
         vector=vector,
-        point=np.array([on_capsules(p, capsules, inward_normals(p, capsules)) for p in points]),
+        point=_moved_points(was.point, old, model),
     )
+
+
+def _moved_palm(was: WholeHand, old: Model, model: Model) -> tuple[Array, Array]:
+    """Positions (S, 3) and quaternions (S, 4) of a palm that the program moved, as far off the task's as before."""
+    when, time = _stretched(old, model), old.schedule.samples
+    given = _spline(time, old.palm_position)(when) * old.units.length / model.units.length
+    turns = _turns(time, old.palm_quaternion, when)
+    quaternions = [
+        quaternion(_matrix(now) @ turn.T @ _matrix(before))
+        for now, turn, before in zip(model.palm_quaternion, turns, was.palm_quaternion, strict=True)
+    ]
+    return was.palm_position + model.palm_position - given, np.array(quaternions)
+
+
+def _moved_points(points: Array, old: Model, model: Model) -> Array:
+    """Contact points (S, C, 3) moved by what the task's contacts moved, on the object's surface as it is now."""
+    before = old.patches[[old.contact_names.index(name) for name in model.contact_names]]
+    patches, capsules = model.patches, model.capsules
+    if model.ground is not None and old.ground is not None:
+        patches, before = np.vstack([patches, model.ground.patch]), np.vstack([before, old.ground.patch])
+        capsules = np.vstack([capsules, model.ground.capsule])
+    moved = points + patches - before * (old.units.length / model.units.length)
+    return np.array([on_capsules(p, capsules, inward_normals(p, capsules)) for p in moved])
 
 
 def _followed(was: WholeHand, moved: WholeHand, on_link: Array, old: Model, model: Model) -> WholeHand:
@@ -240,9 +249,8 @@ def _reach(finger: FingerSeed, angles: Array, on_link: Array, away: Array) -> Ar
 
 def _in_palm(hand: WholeHand, model: Model) -> Array:
     """Contact points (S, C, 3) in the palm's frame."""
-    reference = pin.Quaternion(*model.reference).matrix()
-    turns = np.array([pin.exp3(v) @ reference for v in hand.vector])
-    palms = np.array([pin.Quaternion(*q).matrix() for q in hand.palm_quaternion])
+    turns = np.array([pin.exp3(v) @ _matrix(model.reference) for v in hand.vector])
+    palms = np.array([_matrix(q) for q in hand.palm_quaternion])
     world = np.einsum("sij,scj->sci", turns, hand.point) + (hand.position - hand.palm_position)[:, None]
     return np.asarray(np.einsum("sji,scj->sci", palms, world))
 
@@ -253,6 +261,18 @@ def _vectors(rotations: Array) -> Array:
     for rotation in rotations:
         vectors.append(nearest_exponential(rotation, vectors[-1]))
     return np.array(vectors[1:])
+
+
+def _turns(time: Array, quaternions: Array, when: Array) -> Array:
+    """Rotations (S, 3, 3) at other times, of something that starts and ends at rest."""
+    turns = np.array([_matrix(q) for q in quaternions])
+    vectors = _spline(time, _vectors(turns @ turns[0].T))(when)
+    return np.array([pin.exp3(v) @ turns[0] for v in vectors])
+
+
+def _matrix(orientation: Array) -> Array:
+    """Rotation matrix (3, 3) of a unit quaternion."""
+    return np.asarray(pin.Quaternion(*orientation).matrix())
 
 
 def _stretched(old: Model, new: Model) -> Array:

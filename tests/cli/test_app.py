@@ -136,6 +136,8 @@ def test_bad_input_is_one_message_and_exit_2(
         ["solve"],
         ["solve", "t.yaml", "--until", "never"],
         ["solve", "t.yaml", "--seeds", "0"],
+        ["solve", "t.yaml", "--from", "d", "--seeds", "2"],
+        ["solve", "t.yaml", "--from", "d", "--until", "synthesis"],
         ["replay", "d", "--perturb", "-1"],
     ],
 )
@@ -185,6 +187,32 @@ def test_solve_passes_its_options_on(task_file: Path, monkeypatch: pytest.Monkey
     call = calls[0]
     assert call["task"] == load_task(task_file)
     assert (call["seed"], call["jobs"], call["until"], call["out"]) == (4, 2, "whole_hand", tmp_path / "out")
+
+
+def test_solve_starts_from_an_earlier_result(task_file: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    start = tmp_path / "alternatives" / "seed3"
+    example_design().save(start)
+    calls = solve_gives(monkeypatch, example_design())
+    was_there: list[bool] = []
+    made_up = casadi_hands.pipeline.solve
+    monkeypatch.setattr(
+        "casadi_hands.pipeline.solve",
+        lambda *given, **named: (was_there.append((start / "result.json").exists()), made_up(*given, **named))[1],
+    )
+    run("solve", task_file, "--from", start, "--out", tmp_path, "--seed", 2, "--jobs", 1)
+    (call,) = calls
+    assert (call["start"], call["seed"], call["jobs"], call["until"]) == (start, 2, 1, "refine")
+    # Alternatives of an earlier solve go, but not before one of them has been the start.
+    assert was_there == [True]
+    assert not start.exists()
+
+
+def test_one_message_says_what_does_not_go_with_an_earlier_result(task_file: Path) -> None:
+    found = run("solve", task_file, "--from", "there", "--seeds", 2, "--until", "floating")
+    assert found.exit_code == 2
+    assert "one hand is refined, to the end: give neither --seeds nor --until" in " ".join(
+        found.stderr.replace("│", " ").split()
+    )
 
 
 def test_solve_writes_to_results_by_default(task_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from casadi_hands.design import Design
 from casadi_hands.pipeline import certify
-from casadi_hands.pipeline.certify import Certifier
+from casadi_hands.pipeline.certify import REPLAYS, Certifier
 from casadi_hands.pipeline.record import Record
 from casadi_hands.search.algorithm import Candidate, Found
 from casadi_hands.stages.model import build_model
@@ -108,3 +108,24 @@ def test_a_hand_far_from_its_contacts_is_not_refined(monkeypatch: pytest.MonkeyP
     loop = Loop(monkeypatch, [], max_joints=3)
     assert loop.run(found((1, 1), farthest=0.31)).reason == "far"
     assert loop.tried == ["whole hand"]
+
+
+def test_a_design_there_is_already_is_returned_where_no_hand_is_better(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Limits missed and replays dropped by that design and by the two hands, and which of them is best.
+    cases = (((2, 0), (2, 3), 0), ((2, 0), (3, 1), 2), ((0, 4), (1, 2), 0), ((0, 4), (0, 0), 1))
+    for known, (first, second), best in cases:
+        loop = Loop(monkeypatch, [(first, "contact1.cone", False), (second, "contact1.cone", False)], max_joints=1)
+        loop.dropped = [0, 0]
+        status = "failed" if known[0] else "certified"
+        design = loop.run(
+            found((1, 1), (1, 1)), (known, replace(loop.record.design, status=status, reason="attempt 0"))
+        )
+        assert design.reason == f"attempt {best}"
+
+
+def test_a_design_there_is_already_is_better_than_a_hand_far_from_its_contacts(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    loop = Loop(monkeypatch, [], max_joints=3)
+    known = replace(loop.record.design, status="certified", reason="known")
+    assert loop.run(found((1, 1), farthest=0.31), ((0, REPLAYS), known)).reason == "known"

@@ -11,6 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.design import Design
+from casadi_hands.stages import refine
 from casadi_hands.stages.floating import FloatingStage
 from casadi_hands.stages.model import Model, build_model
 from casadi_hands.stages.outcome import hand_of, joint_loads, whole_hand_motion
@@ -297,3 +298,34 @@ def test_one_joint_cannot_roll_with_the_object_and_no_exact_solve_is_tried(solve
     assert not refined.exact
     assert max(refined.slips.values()) > HOPELESS
     assert [what for what, _ in refined.runs] == ["soft", "firm"]
+
+
+def test_an_exact_motion_stays_itself_by_the_short_way(solved: Solved) -> None:
+    model, before = solved.model, solved.refined.hand
+    again = RefineStage(model, before.contacts, (2,) * model.contacts, before.active).solve(before, near=True)
+    assert again.exact
+    assert [what for what, _ in again.runs] == ["exact"]
+    assert again.runs[0][1].iterations < sum(solution.iterations for _, solution in solved.refined.runs) / 2
+    # The hand is held where it is, which the long way does not do.
+    first, second = (
+        max(moved[part] for moved in each.moved.values() for part in ("base", "lengths", "axes"))
+        for each in (solved.refined, again)
+    )
+    assert second < 0.2 * first
+    np.testing.assert_allclose(again.hand.position, before.position, atol=0.02)
+    assert all(0 < slip < 4e-3 for slip in again.slips.values())
+
+
+def test_where_the_short_way_leads_nowhere_the_long_one_is_taken(
+    solved: Solved, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    last, weights, options = refine.SHORT_WAY[-1]
+    monkeypatch.setattr(refine, "SHORT_WAY", (refine.SHORT_WAY[0], (last, weights, replace(options, max_iter=1))))
+    model, before = solved.model, solved.refined.hand
+    # The second goal a little farther to the side.
+    farther = replace(
+        model, goal_positions=np.add(model.goal_positions, [[0, 0, 0], [0, 0.05, 0], [0, 0, 0], [0, 0, 0]])
+    )
+    again = RefineStage(farther, before.contacts, (2,) * model.contacts, before.active).solve(before, near=True)
+    assert again.exact
+    assert [what for what, _ in again.runs][-4:] == ["exact", "soft", "firm", "exact"]

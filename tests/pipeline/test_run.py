@@ -1,0 +1,108 @@
+"""What is run where there is an earlier result to start from, on made-up outcomes of its refinement."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from casadi_hands.design import Design
+from casadi_hands.errors import DesignError, SolveError
+from casadi_hands.pipeline import Progress, run, solve
+from casadi_hands.pipeline.certify import DROPS, FIRM, Refiner
+from casadi_hands.task import parse_task
+from tests.pipeline.test_warm import HELD, earlier, edited, pressing
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """An earlier result that kept a firm grip."""
+    earlier(motion=pressing(2.1, 0.4), status="certified").save(tmp_path / "earlier")
+    return tmp_path / "earlier"
+
+
+def refined_as(monkeypatch: pytest.MonkeyPatch, status: str, drops: int) -> list[dict[str, Any]]:
+    """Let refinements end with a status and dropped replays; the calls they get."""
+    calls: list[dict[str, Any]] = []
+
+    def certify(self: Refiner, whole: Any, short: Any, margin: Any, near: bool) -> tuple[Design, Any, int]:
+        calls.append(
+            {"whole": whole, "short": short, "margin": margin, "near": near, "motion": self.record.design.motion}
+        )
+        self.record.add_runs([{"stage": "refine", "seconds": 0.0}])
+        reason = "" if status == "certified" else "too far"
+        certificate = {"slip": {"holds": status == "certified"}}
+        return replace(self.record.design, status=status, reason=reason, certificate=certificate), None, drops
+
+    monkeypatch.setattr(Refiner, "certify", certify)
+    return calls
+
+
+def never(*_: Any) -> Design:
+    raise AssertionError("not asked for")
+
+
+def test_a_certified_refinement_of_the_earlier_hand_is_the_result(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = refined_as(monkeypatch, "certified", DROPS)
+    monkeypatch.setattr(run, "_run", never)
+    solve(parse_task(edited("[0.115, 0, 0.3] -> [0.115, 0.005, 0.3]")), jobs=1, out=tmp_path / "out", start=folder)
+    (call,) = calls
+    assert (call["short"], call["margin"], call["near"]) == ((), FIRM, True)
+    np.testing.assert_allclose(call["motion"].object_position[10], [0.115, 0.005, 0.3], atol=1e-9)
+    np.testing.assert_allclose(call["whole"].position[10] * 0.06, [0.115, 0.005, 0.3], atol=1e-9)
+    loaded = Design.load(tmp_path / "out")
+    assert loaded.status == "certified"
+    assert [entry["started_from"] for entry in loaded.stages] == [str(folder)]
+    assert set(loaded.seconds) == {"total"}
+
+
+def test_the_folder_that_is_written_may_be_the_start(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    refined_as(monkeypatch, "certified", 0)
+    solve(parse_task(edited("mass: 0.1 -> mass: 0.15")), jobs=1, out=folder, start=folder)
+    motion = Design.load(folder).motion
+    assert motion is not None
+    np.testing.assert_allclose(motion.contact_force, 1.5 * pressing(2.1, 0.4).contact_force, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("status", "drops", "rank", "words"),
+    [("feasible", 0, (1, 0), "no hand serves: too far; now"), ("certified", 5, (0, 5), "5 of 12 replays dropped the")],
+)
+def test_where_it_does_not_serve_all_stages_are_run_and_know_of_it(
+    status: str, drops: int, rank: tuple[int, int], words: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refined_as(monkeypatch, status, drops)
+    given: list[Any] = []
+
+    def all_stages(record: Any, until: str, executor: Any, jobs: int, best: Any) -> Design:
+        # Without the earlier hand, which is not that of the motions to come.
+        assert (record.design.hand, record.design.motion) == (None, None)
+        given.append(best)
+        design: Design = best[1]
+        return design
+
+    monkeypatch.setattr(run, "_run", all_stages)
+    news: list[Progress] = []
+    design = solve(parse_task(HELD), jobs=1, start=folder, progress=news.append)
+    assert [best[0] for best in given] == [rank]
+    assert design.hand is not None
+    assert any(words in word.text for word in news)
+
+
+def test_what_cannot_be_started_from_is_refused_before_anything_is_written(folder: Path, tmp_path: Path) -> None:
+    task = parse_task(edited("ground: {height: 0.2}"))
+    for start, error, words in (
+        (folder, SolveError, "ground: none there, one in the task"),
+        (tmp_path / "nowhere", DesignError, "there is no such folder"),
+    ):
+        with pytest.raises(error, match=words):
+            solve(task, jobs=1, out=tmp_path / "out", start=start)
+    with pytest.raises(SolveError, match="only the stage refine is run; it cannot stop after floating"):
+        solve(parse_task(HELD), until="floating", start=folder)
+    assert not (tmp_path / "out").exists()
+    assert Design.load(folder).status == "certified"
