@@ -21,7 +21,7 @@ from casadi_hands.stages.object_side import (
     straight_path,
     term_weights,
 )
-from casadi_hands.stages.regrasp import planned_regrasp
+from casadi_hands.stages.regrasp import held_back, planned_regrasp
 
 Array = NDArray[np.float64]
 THRESHOLDS = (0.1, 0.2, 0.3)
@@ -57,13 +57,19 @@ class Floating:
 
 
 def solve_floating(model: Model, weights: Mapping[str, float]) -> Floating:
-    """Stage 1, with a regrasp where contacts would travel too far around the object and others can hold it."""
+    """Stage 1; contacts that would travel too far around the object are taken anew if others can hold it meanwhile.
+
+    Where they cannot, contacts are held back, which fingers at least can follow.
+    """
     floating = FloatingStage(model).solve(weights)
-    plan = planned_regrasp(model, floating.pose)
-    if plan is None:
+    anew = planned_regrasp(model, floating.pose)
+    if anew is None:
         return floating
-    planned = replace(model, regrasp=plan)
-    return FloatingStage(planned).solve_regrasp(floating, weights) or floating
+    for plan in (anew, held_back(model, floating.pose)):
+        replanned = FloatingStage(replace(model, regrasp=plan)).solve_regrasp(floating, weights)
+        if replanned is not None:
+            return replanned
+    return floating
 
 
 class FloatingStage:
@@ -138,9 +144,11 @@ class FloatingStage:
         flags = (before.active & ~self.model.regrasp.lifted).astype(float)
         fixed = {"activity": flags}
         # Free, a contact that is to touch elsewhere would touch near where it was and slide there.
-        room = np.where(self.model.regrasp.lifted.any(axis=0), REGRASP_ROOM, np.inf)[None, :, None]
+        patches = self.model.keyframe_patches
+        moved = np.any(patches != patches[0], axis=(0, 2))
+        room = np.where(moved, REGRASP_ROOM, np.inf)[None, :, None]
         lower, upper = (
-            {**fixed, "point": (self.model.keyframe_patches + side * room).reshape(keyframes, -1)} for side in (-1, 1)
+            {**fixed, "point": (patches + side * room).reshape(keyframes, -1)} for side in (-1, 1)
         )
         solution = self.solver.solve({**start, **fixed}, parameters, OPTIONS, lower=lower, upper=upper)
         if not passes_gate(self.model, solution.values, pivots=True):

@@ -61,7 +61,7 @@ class Ground:
 
 @dataclass(frozen=True)
 class Regrasp:
-    """Fingers that lift and touch again elsewhere, planned.
+    """Contacts that are to move on the object, planned: fingers lift and touch again elsewhere, or slide there.
 
     Attributes:
         lifted: (N, C) bool, from its keyframe to the next; the ground's contact, if any, last.

@@ -1,4 +1,4 @@
-"""Where fingers must let go: a contact that the object's turn would carry too far around it is taken anew."""
+"""Where fingers cannot follow: a contact that the object's turn would carry too far is taken anew, or held back."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from casadi_hands.stages.grasp import inward_normals, on_capsules
 from casadi_hands.stages.model import Model, Regrasp, palm_from_world
 
 Array = NDArray[np.float64]
-FARTHEST = np.radians(
-    100
-)  # that a contact travels around the object, seen from the palm: beyond it fingers reach around
+# That a contact travels around the object, seen from the palm: beyond it fingers reach around.
+FARTHEST = np.radians(100)
+HELD_WITHIN = np.radians(60)  # likewise, of contacts that cannot be taken anew: near enough for fingers to roll on
 
 
 def planned_regrasp(model: Model, pose: Array) -> Regrasp | None:
@@ -28,11 +28,7 @@ def planned_regrasp(model: Model, pose: Array) -> Regrasp | None:
     Returns:
         The plan, or None where every contact can stay.
     """
-    keyframes = model.schedule.keyframes
-    reference = pin.Quaternion(*model.reference).matrix()
-    turns = [
-        palm_from_world(model, t)[0] @ pin.exp3(row[3:]) @ reference for t, row in zip(keyframes, pose, strict=True)
-    ]
+    turns, keyframes = _turns(model, pose), model.schedule.keyframes
     patches = model.keyframe_patches.copy()
     lifted = np.zeros(patches.shape[:2], bool)
     for c in range(model.contacts):
@@ -41,9 +37,45 @@ def planned_regrasp(model: Model, pose: Array) -> Regrasp | None:
             # The last keyframe is too late to touch again.
             if _angle(turns[k] @ patches[k, c], taken) > FARTHEST and k < len(keyframes) - 1:
                 lifted[k - 1, c] = True
-                anew, capsule = (turns[k].T @ taken)[None], model.capsules[c : c + 1]
-                patches[k:, c] = on_capsules(anew, capsule, inward_normals(anew, capsule))[0]
+                patches[k:, c] = _on_surface(model, c, turns[k].T @ taken)
     return Regrasp(lifted, patches) if lifted.any() else None
+
+
+def held_back(model: Model, pose: Array) -> Regrasp:
+    """Contacts that stay within ``HELD_WITHIN`` of where they touched, while the object turns on beneath them.
+
+    For a turn that fingers cannot follow and during which none of them can let go: they must roll, or slide.
+
+    Args:
+        model: the task.
+        pose: (N, 6) of the object at the keyframes.
+    """
+    turns, patches = _turns(model, pose), model.keyframe_patches.copy()
+    for c in range(model.contacts):
+        taken = turns[0] @ patches[0, c]
+        for k in range(1, len(turns)):
+            carried = turns[k] @ patches[k - 1, c]
+            patches[k, c] = patches[k - 1, c]
+            beyond = _angle(carried, taken) - HELD_WITHIN
+            if beyond > 0:
+                axis = np.cross(carried, taken)
+                back = pin.exp3(beyond * axis / np.linalg.norm(axis)) @ carried
+                patches[k, c] = _on_surface(model, c, turns[k].T @ back)
+    return Regrasp(np.zeros(patches.shape[:2], bool), patches)
+
+
+def _turns(model: Model, pose: Array) -> list[Array]:
+    """Rotations (3, 3) of the object at the keyframes, palm frame."""
+    reference = pin.Quaternion(*model.reference).matrix()
+    return [
+        palm_from_world(model, t)[0] @ pin.exp3(row[3:]) @ reference
+        for t, row in zip(model.schedule.keyframes, pose, strict=True)
+    ]
+
+
+def _on_surface(model: Model, contact: int, point: Array) -> Array:
+    capsule = model.capsules[contact : contact + 1]
+    return np.asarray(on_capsules(point[None], capsule, inward_normals(point[None], capsule))[0])
 
 
 def _angle(first: Array, second: Array) -> float:

@@ -12,7 +12,7 @@ from casadi_hands.stages.floating import solve_floating
 from casadi_hands.stages.grasp import passes_gate
 from casadi_hands.stages.model import Model, Regrasp, build_model
 from casadi_hands.stages.object_side import sampled_points, straight_path
-from casadi_hands.stages.regrasp import FARTHEST, planned_regrasp
+from casadi_hands.stages.regrasp import FARTHEST, held_back, planned_regrasp
 from casadi_hands.task import parse_task
 
 Array = np.ndarray
@@ -61,6 +61,48 @@ def test_only_the_contact_off_the_axis_lets_go_and_takes_the_object_where_it_fir
     axis = capsule[:3] + along * (capsule[3:6] - capsule[:3])
     distance = np.linalg.norm(plan.patches[3, 2] - axis, axis=1).min()
     assert distance == pytest.approx(capsule[6], abs=1e-6)
+
+
+def ball() -> Model:
+    """A ball between three fingers that turns half around and back, a third of that between keyframes."""
+    return build_model(
+        parse_task("""
+object: {mass: 0.05, shapes: [{sphere: {center: [0, 0, 0], radius: 0.03}}]}
+palm: {radius: 0.05, position: [0, 0, 0.3], facing: [0, 0, -1]}
+motion:
+  - {at: 0, position: [0, 0, 0.2]}
+  - {at: 3, position: [0, 0, 0.2], rotation: {axis: [0, 0, 1], degrees: 180}}
+  - {at: 6, position: [0, 0, 0.2]}
+fingers:
+  thumb: {touches: [0.03, 0, 0]}
+  index: {touches: [-0.015, 0.02598, 0]}
+  middle: {touches: [-0.015, -0.02598, 0]}
+friction: 0.7
+keyframes_between: 2
+""")
+    )
+
+
+def test_contacts_that_cannot_let_go_stay_behind_and_are_carried_back() -> None:
+    model = ball()
+    pose = straight_path(model)
+    patches = held_back(model, pose).patches
+    seen = np.einsum("kij,kcj->kci", Rotation.from_rotvec(pose[:, 3:]).as_matrix(), patches)
+    azimuth = np.degrees(np.arctan2(seen[..., 1], seen[..., 0]))
+    travelled = (azimuth - azimuth[0] + 180) % 360 - 180
+    # The object turns by 60 degrees between keyframes; contacts travel with it until they are 60 from where they began.
+    np.testing.assert_allclose(travelled, np.tile([0, 60, 60, 60, 0, -60, -60], (3, 1)).T, atol=1e-6)
+    np.testing.assert_allclose(np.linalg.norm(seen, axis=2), 1.0, atol=1e-4)
+
+
+def test_a_ball_that_two_fingers_cannot_hold_is_turned_with_contacts_held_back() -> None:
+    model = ball()
+    floating = solve_floating(model, parse_task_weights())
+    assert floating.model.regrasp is not None
+    assert floating.active.all()
+    assert not floating.model.regrasp.lifted.any()
+    seen = np.einsum("kij,kcj->kci", Rotation.from_rotvec(floating.pose[:, 3:]).as_matrix(), floating.point)
+    assert (seen * seen[:1]).sum(axis=2).min() > np.cos(FARTHEST)
 
 
 def test_what_counts_is_the_way_seen_from_the_palm() -> None:
