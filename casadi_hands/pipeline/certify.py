@@ -14,7 +14,7 @@ from casadi_hands.reasons import Reason
 from casadi_hands.search.algorithm import Candidate, Found, Search, run_record
 from casadi_hands.stages.floating import Floating
 from casadi_hands.stages.model import Model
-from casadi_hands.stages.refine import WEIGHTS, Margin, Refined, RefineStage
+from casadi_hands.stages.refine import Margin, Refined, RefineStage
 from casadi_hands.stages.whole_hand import WholeHand
 from casadi_hands.verify import replay, replay_many
 
@@ -162,7 +162,7 @@ class Refiner:
             short: what its fingers could not do before.
             planned: the design before it was refined.
         """
-        self.record.set_costs("refine", refined.runs[-1][1], WEIGHTS)
+        self.record.set_costs("refine", refined.runs[-1][1], refined.weights)
         adopt(self.record, self.model, refined.hand)
         causes = [*short, *refined_reason(self.model, refined)]
         return self.judge.judge(self.record.design, causes, None if refined.exact else planned)

@@ -81,9 +81,9 @@ LONG_WAY: tuple[Step, ...] = (
     ("firm", WEIGHTS | FIRM, CLOSER),
     ("exact", WEIGHTS | EXACT, HARD),
 )
-# From an exact motion to one nearby; the first step is left out where the motion rolls.
+# From an exact motion to one nearby; the first step can be left out where joints can follow and supply their forces.
 SHORT_WAY: tuple[Step, ...] = (("firm", WEIGHTS | FIRM | STAY, NEARBY), ("exact", WEIGHTS | EXACT | STAY, HARD_NEARBY))
-ROLLS = 0.3  # of the cost of slip in the short way's first step
+SERVES = 0.1  # cost of slip and of forces that no joint supplies, of the start, in the short way's first step
 
 
 @dataclass(frozen=True)
@@ -97,6 +97,7 @@ class Refined:
         slips: for each contact the slip that its last soft solve was left with, half extents.
         moved: for each contact how far base and lengths moved, half extents, and axes turned, rad.
         runs: every solve: (what, solution).
+        weights: of the terms in the last.
     """
 
     hand: WholeHand
@@ -105,6 +106,7 @@ class Refined:
     slips: dict[str, float]
     moved: dict[str, dict[str, float]]
     runs: tuple[tuple[str, Solution], ...]
+    weights: dict[str, float]
 
     @property
     def slips_hopelessly(self) -> bool:
@@ -140,12 +142,17 @@ class RefineStage:
         if not near:
             return self._take(LONG_WAY, start, margin)
         weights = {f"weight.{term}": SHORT_WAY[0][1][term] / self.knots for term in self.problem.terms}
-        slip = self.solver.evaluate(self._start(start), self._parameters(start, margin) | weights)["slip"]
-        short = self._take(SHORT_WAY[slip < ROLLS :], start, margin)
-        if short.exact:
-            return short
-        refined = self._take(LONG_WAY, start, margin)
-        return replace(refined, runs=short.runs + refined.runs)
+        costs = self.solver.evaluate(self._start(start), self._parameters(start, margin) | weights)
+        ways: tuple[tuple[Step, ...], ...] = (SHORT_WAY, LONG_WAY)
+        if costs["slip"] + costs["passive_force"] < SERVES:
+            ways = (SHORT_WAY[1:], *ways)
+        runs: tuple[tuple[str, Solution], ...] = ()
+        for way in ways:
+            refined = self._take(way, start, margin)
+            runs += refined.runs
+            if refined.exact:
+                break
+        return replace(refined, runs=runs)
 
     def _take(self, way: tuple[Step, ...], start: WholeHand, margin: Margin) -> Refined:
         """Solve step by step; not to the end where a firm solve shows rolling to be out of reach."""
@@ -168,7 +175,7 @@ class RefineStage:
                 slips = self._slips(solution)
                 if not max(slips.values()) <= HOPELESS:  # nor where a solve broke down
                     break
-        return self._result(start, runs, slips or self._slips(solution))
+        return self._result(start, runs, slips or self._slips(solution), weights)
 
     def _constraint_bounds(self, margin: Margin) -> tuple[Bounds, Bounds]:
         """Bounds of constraints: those that hold in every solve, and those of the exact one.
@@ -281,7 +288,9 @@ class RefineStage:
             values[f"helper{c}"] = _helpers(start.point[:, c], model.capsules[c])
         return values
 
-    def _result(self, start: WholeHand, runs: list[tuple[str, Solution]], slips: dict[str, float]) -> Refined:
+    def _result(
+        self, start: WholeHand, runs: list[tuple[str, Solution]], slips: dict[str, float], weights: dict[str, float]
+    ) -> Refined:
         solution = runs[-1][1]
         values, count = solution.values, len(self.model.schedule.samples)
         point, force, active = start.point.copy(), np.zeros_like(start.force), np.zeros_like(start.active)
@@ -318,7 +327,7 @@ class RefineStage:
         )
         worst = max(solution.violations.items(), key=lambda item: item[1])
         exact = runs[-1][0] == "exact" and worst[1] <= ACCEPTED
-        return Refined(hand, exact, worst, slips, moved, tuple(runs))
+        return Refined(hand, exact, worst, slips, moved, tuple(runs), weights)
 
 
 def eased_in(bearing: NDArray[np.bool_]) -> Array:

@@ -306,6 +306,7 @@ def test_an_exact_motion_stays_itself_by_the_short_way(solved: Solved) -> None:
     assert again.exact
     assert [what for what, _ in again.runs] == ["exact"]
     assert again.runs[0][1].iterations < sum(solution.iterations for _, solution in solved.refined.runs) / 2
+    assert solved.refined.weights["stay_design"] < again.weights["stay_design"]
     # The hand is held where it is, which the long way does not do.
     first, second = (
         max(moved[part] for moved in each.moved.values() for part in ("base", "lengths", "axes"))
@@ -328,4 +329,4 @@ def test_where_the_short_way_leads_nowhere_the_long_one_is_taken(
     )
     again = RefineStage(farther, before.contacts, (2,) * model.contacts, before.active).solve(before, near=True)
     assert again.exact
-    assert [what for what, _ in again.runs][-4:] == ["exact", "soft", "firm", "exact"]
+    assert [what for what, _ in again.runs][-5:] == ["firm", "exact", "soft", "firm", "exact"]
