@@ -152,7 +152,7 @@ def test_a_result_has_every_contact_in_its_own_place(made_up: MadeUp) -> None:
     # The middle finger is not in use: its point stays, and it bears nothing.
     start, values = made_up.start, made_up.values
     solution = replace(made_up_solution(values), violations={"a": ACCEPTED, "b": 0.0})
-    refined = made_up.stage._result(start, [("exact", solution)], {})
+    refined = made_up.stage._result(start, [("exact", solution)], {}, WEIGHTS)
     hand, count = refined.hand, len(start.position)
     for column, contact in enumerate((0, 2, 3)):
         for name in ("point", "force"):
@@ -170,7 +170,7 @@ def test_a_result_has_every_contact_in_its_own_place(made_up: MadeUp) -> None:
 @pytest.mark.parametrize("violation", [1.01 * ACCEPTED, np.inf])
 def test_a_motion_that_violates_is_not_exact(made_up: MadeUp, violation: float) -> None:
     solution = replace(made_up_solution(made_up.values), violations={"a": 0.0, "b": violation})
-    refined = made_up.stage._result(made_up.start, [("exact", solution)], {})
+    refined = made_up.stage._result(made_up.start, [("exact", solution)], {}, WEIGHTS)
     assert not refined.exact
     assert refined.worst == ("b", violation)
 
@@ -182,7 +182,7 @@ def test_a_start_that_is_no_number_is_never_accepted(drawn: MadeUp) -> None:
     solution = drawn.stage.solver.solve(values, drawn.parameters(WEIGHTS), HARD)
     assert solution.objective == np.inf
     assert solution.violations["wrench.sum"] == np.inf
-    assert not drawn.stage._result(bad, [("exact", solution)], {}).exact
+    assert not drawn.stage._result(bad, [("exact", solution)], {}, WEIGHTS).exact
 
 
 # A solve: figure 3.6a with two joints a finger, from three random starts each.
