@@ -237,11 +237,10 @@ def _refine(task: Task, model: Model, size: Size) -> Measured:
     whole = WholeHandStage(model, contacts, joints, False)
     start = whole.solve(floating, tuple(alone), dict(task.weights.whole_hand), replace(WHOLE, max_iter=40))
 
-    settings = {name: getattr(refine, name) for name in ("SOFT", "CLOSER", "HARD", "HARD_FROM_AFAR")}
-    short = {name: replace(options, max_iter=ITERATIONS) for name, options in settings.items()}
+    short = tuple((what, weight, replace(how, max_iter=ITERATIONS)) for what, weight, how in refine.LONG_WAY)
 
     def iterate(stage: refine.RefineStage) -> list[Solution]:
-        with patch.multiple(refine, **short):
+        with patch.object(refine, "LONG_WAY", short):
             return [solution for _, solution in stage.solve(start).runs]
 
     return lambda: refine.RefineStage(model, contacts, joints, start.active), iterate

@@ -147,9 +147,7 @@ class FloatingStage:
         patches = self.model.keyframe_patches
         moved = np.any(patches != patches[0], axis=(0, 2))
         room = np.where(moved, REGRASP_ROOM, np.inf)[None, :, None]
-        lower, upper = (
-            {**fixed, "point": (patches + side * room).reshape(keyframes, -1)} for side in (-1, 1)
-        )
+        lower, upper = ({**fixed, "point": (patches + side * room).reshape(keyframes, -1)} for side in (-1, 1))
         solution = self.solver.solve({**start, **fixed}, parameters, OPTIONS, lower=lower, upper=upper)
         if not passes_gate(self.model, solution.values, pivots=True):
             return None

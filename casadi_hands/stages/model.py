@@ -149,6 +149,12 @@ class Model:
         patches = self.patches if self.ground is None else np.vstack([self.patches, self.ground.patch])
         return np.tile(patches, (len(self.schedule.keyframes), 1, 1))
 
+    def slides(self, contact: int) -> bool:
+        """Whether a finger's contact is planned to move on the object without lifting."""
+        if self.regrasp is None or self.regrasp.lifted[:, contact].any():
+            return False
+        return bool(np.any(self.regrasp.patches[:, contact] != self.regrasp.patches[0, contact]))
+
     def point_spline(self, contact: int, offset: float = 0.0) -> Array:
         """(S, N) weights of a contact point at the samples, ``offset`` steps later.
 

@@ -24,19 +24,16 @@ from casadi_hands.stages.whole_hand import WholeHand
 Array = NDArray[np.float64]
 _NEAR = (("nlp_scaling_method", "none"), ("bound_push", 1e-6), ("bound_frac", 1e-6))
 # Barriers are monotone: an adaptive one was seen to leap away from good starts. Small ones stay near them, where a
-# large one first wanders to the middle of all bounds and back; it serves only where much slip is left to remove.
+# large one first wanders to the middle of all bounds and back; too small ones crawl along every bound they meet.
 SOFT = Options(max_iter=150, tol=1e-3, acceptable_tol=1e-2, constr_viol_tol=1e-4, mu_init=1e-3, extra=_NEAR)
-CLOSER = Options(max_iter=100, tol=1e-3, acceptable_tol=1e-2, constr_viol_tol=1e-6, mu_init=1e-6, extra=_NEAR)
-HARD = Options(max_iter=100, tol=1e-6, acceptable_tol=1e-5, constr_viol_tol=1e-10, mu_init=1e-6, extra=_NEAR)
-HARD_FROM_AFAR = Options(max_iter=300, tol=1e-6, acceptable_tol=1e-5, constr_viol_tol=1e-10, mu_init=1e-4, extra=_NEAR)
-# To these barriers and tolerances constraints are met as well, and the least cost nearly, in half the iterations.
-NEARBY = Options(max_iter=100, tol=1e-3, acceptable_tol=1e-2, constr_viol_tol=1e-4, mu_init=1e-4, extra=_NEAR)
-HARD_NEARBY = Options(max_iter=60, tol=1e-4, acceptable_tol=1e-4, constr_viol_tol=1e-10, mu_init=1e-4, extra=_NEAR)
+FIRM_SOLVE = Options(max_iter=150, tol=1e-3, acceptable_tol=1e-2, constr_viol_tol=1e-6, mu_init=1e-4, extra=_NEAR)
+HARD = Options(max_iter=300, tol=1e-4, acceptable_tol=1e-3, constr_viol_tol=1e-10, mu_init=1e-4, extra=_NEAR)
 EASED = 5  # knots over which a contact that touches or lifts comes to press with its full force, or to let go
-AFAR = 0.01  # half extents of slip that the firm solve leaves: more is much
 TOOL_TOLERANCE = 5e-3  # half extents, how far a drawing's tool may leave its path between goals
 ACCEPTED = 1e-7  # largest violation with which a refined motion is handed on
-HOPELESS = 0.1  # half extents of slip: where a firm solve leaves more, rolling is out of the structure's reach
+HOPELESS = 0.1  # half extents of slip: where firm solves leave more, rolling is out of the structure's reach
+FALLING = 0.5  # of the soft solve's slip: where the firm one leaves more than hopeless, but less than this, it goes on
+SLIDING_TIE = 0.3  # of a contact to where it was planned to slide; it shall roll if it can
 Bounds = dict[str, tuple[ArrayLike, ArrayLike]]
 
 
@@ -73,16 +70,18 @@ WEIGHTS = {
     "force_regularisation": 1e-3,
 }
 FIRM = {"slip": 100.0, "passive_force": 30.0}
+FIRMER = FIRM | {"slip": 1000.0}
 EXACT = {"slip": 100.0}  # its tolerance is there for where it is needed
 STAY = {"stay_design": 2.0}  # a hand that serves nearly
 Step = tuple[str, dict[str, float], Options]
 LONG_WAY: tuple[Step, ...] = (
     ("soft", WEIGHTS, SOFT),
-    ("firm", WEIGHTS | FIRM, CLOSER),
+    ("firm", WEIGHTS | FIRM, FIRM_SOLVE),
+    ("firmer", WEIGHTS | FIRMER, FIRM_SOLVE),
     ("exact", WEIGHTS | EXACT, HARD),
 )
 # From an exact motion to one nearby; the first step can be left out where joints can follow and supply their forces.
-SHORT_WAY: tuple[Step, ...] = (("firm", WEIGHTS | FIRM | STAY, NEARBY), ("exact", WEIGHTS | EXACT | STAY, HARD_NEARBY))
+SHORT_WAY: tuple[Step, ...] = (("firm", WEIGHTS | FIRM | STAY, FIRM_SOLVE), ("exact", WEIGHTS | EXACT | STAY, HARD))
 SERVES = 0.1  # cost of slip and of forces that no joint supplies, of the start, in the short way's first step
 
 
@@ -110,8 +109,8 @@ class Refined:
 
     @property
     def slips_hopelessly(self) -> bool:
-        """Whether the firm solve was left with so much slip that no exact one was tried."""
-        return self.runs[-1][0] == "firm"
+        """Whether the firm solves were left with so much slip that no exact one was tried."""
+        return self.runs[-1][0] != "exact"
 
 
 class RefineStage:
@@ -155,15 +154,19 @@ class RefineStage:
         return replace(refined, runs=runs)
 
     def _take(self, way: tuple[Step, ...], start: WholeHand, margin: Margin) -> Refined:
-        """Solve step by step; not to the end where a firm solve shows rolling to be out of reach."""
+        """Solve step by step; not to the end where firm solves show rolling to be out of reach."""
         values, parameters = self._start(start), self._parameters(start, margin)
         lower, upper = self._bounds()
         always, exact = self._constraint_bounds(margin)
         runs: list[tuple[str, Solution]] = []
         slips: dict[str, float] = {}
+        most = 0.0
         for what, weights, options in way:
-            if options is HARD and max(slips.values()) > AFAR:
-                options = HARD_FROM_AFAR
+            most, before = max(slips.values(), default=0.0), most
+            if what == "firmer" and not HOPELESS < most < FALLING * before:
+                continue
+            if what == "exact" and not most <= HOPELESS:  # nor where a solve broke down
+                break
             weighted: dict[str, ArrayLike] = {
                 f"weight.{term}": weights[term] / self.knots for term in self.problem.terms
             }
@@ -171,10 +174,8 @@ class RefineStage:
             solution = self.solver.solve(values, parameters | weighted, options, lower, upper, bounds)
             runs.append((what, solution))
             values = solution.values
-            if what == "firm":
+            if what != "exact":
                 slips = self._slips(solution)
-                if not max(slips.values()) <= HOPELESS:  # nor where a solve broke down
-                    break
         return self._result(start, runs, slips or self._slips(solution), weights)
 
     def _constraint_bounds(self, margin: Margin) -> tuple[Bounds, Bounds]:
@@ -285,6 +286,7 @@ class RefineStage:
             values[f"wanted_base{c}"], values[f"wanted_lengths{c}"] = finger.base, finger.lengths
             values[f"wanted_axes{c}"] = finger.axes.reshape(1, -1)
             values[f"capsule{c}"] = model.capsules[c]
+            values[f"tie{c}"] = SLIDING_TIE if model.slides(c) else 1.0
             values[f"helper{c}"] = _helpers(start.point[:, c], model.capsules[c])
         return values
 

@@ -133,6 +133,7 @@ class RefineProblem:
                 problem.parameter(f"{name}{c}", (count, 3))
         for c, n in zip(structure.contacts, structure.joints, strict=True):
             problem.parameter(f"helper{c}", (count, 3))
+            problem.parameter(f"tie{c}", (1, 1))
             for name, width in (("frames", 9 * n), ("wanted_base", 2), ("wanted_lengths", n), ("wanted_axes", 2 * n)):
                 problem.parameter(f"{name}{c}", (1, width))
 
@@ -217,7 +218,7 @@ class RefineProblem:
 
         touching = np.flatnonzero(structure.touching[:, i])
         parameters = [*frames, *self._scene(c, touching)]
-        parameters += self._at(("friction", f"wanted_point{c}", f"wanted_force{c}"), touching)
+        parameters += self._at(("friction", f"tie{c}", f"wanted_point{c}", f"wanted_force{c}"), touching)
         surfaces = {"on_object": (0.0, 0.0), "on_link": (0.0, 0.0)}
         kernel = finger.contact(n, c, np.isfinite(torque))
         variables = rows(touching, self.pose, point, self.force.entries(*span), angles)

@@ -45,6 +45,7 @@ class Contact:
         self.off_object, self.normal = surface(self.point, self.capsule)
         self.force = 0.5 * rng.normal(size=3) - rng.uniform(0.5, 2) * self.normal
         self.wanted_point, self.wanted_force = rng.normal(size=(2, 3))
+        self.tie = rng.uniform(0.1, 1)
 
     @property
     def scene(self) -> dict[str, object]:
@@ -56,7 +57,12 @@ class Contact:
         """Variables and parameters of the contact's kernel."""
         variables = {"pose": self.place.pose, "point": self.point, "force": self.force, "angles": self.finger.angles[0]}
         wanted = {"wanted_point": self.wanted_point, "wanted_force": self.wanted_force}
-        return {**shape(self.finger), **variables}, {**self.scene, "friction": self.friction, **wanted}
+        return {**shape(self.finger), **variables}, {
+            **self.scene,
+            "friction": self.friction,
+            "tie": self.tie,
+            **wanted,
+        }
 
     @property
     def held(self) -> Block:
@@ -95,7 +101,9 @@ def test_a_contact_s_numbers_are_those_of_numpy_and_pinocchio(joints: int, seed:
     np.testing.assert_allclose(found["passive"], passive, atol=1e-6)
     np.testing.assert_allclose(found["passive_force"], passive @ passive, atol=1e-6)
     np.testing.assert_allclose(found["torque"], jacobian.T @ in_palm, atol=1e-6)
-    np.testing.assert_allclose(found["stay_point"], ((case.point - case.wanted_point) ** 2).sum(), rtol=1e-12)
+    np.testing.assert_allclose(
+        found["stay_point"], case.tie**2 * ((case.point - case.wanted_point) ** 2).sum(), rtol=1e-12
+    )
     np.testing.assert_allclose(found["stay_force"], ((force - case.wanted_force) ** 2).sum(), rtol=1e-12)
 
 
