@@ -51,7 +51,7 @@ class Solution:
         terms: cost term -> weighted value.
         objective: sum of the terms.
         violation: largest violation of a constraint.
-        violations: ``kernel.constraint`` -> its largest violation.
+        excess: ``kernel.constraint`` -> how far each of its values is beyond its bounds; 0 within.
         constraints: ``kernel.constraint`` -> its values, one row an instance.
         status: IPOPT's own words; never taken as proof.
         iterations: number of iterations; 0 where IPOPT did not start.
@@ -63,12 +63,17 @@ class Solution:
     terms: dict[str, float]
     objective: float
     violation: float
-    violations: dict[str, float]
+    excess: dict[str, Vector] = field(repr=False)
     constraints: dict[str, Vector] = field(repr=False)
     status: str
     iterations: int
     seconds: float
     multipliers: dict[str, Vector] = field(repr=False, default_factory=dict)
+
+    @property
+    def violations(self) -> dict[str, float]:
+        """Largest violation of each ``kernel.constraint``."""
+        return {name: float(excess.max(initial=0.0)) for name, excess in self.excess.items()}
 
 
 class Solver:
@@ -185,7 +190,7 @@ class Solver:
             terms=dict(zip(problem.terms, terms.tolist(), strict=True)),
             objective=float(f[0]) if np.isfinite(f[0]) else np.inf,
             violation=float(beyond.max(initial=0.0)),
-            violations={name: float(beyond[rows].max(initial=0.0)) for name, rows in problem.constraint_rows.items()},
+            excess={name: beyond[rows] for name, rows in problem.constraint_rows.items()},
             constraints={name: g[rows] for name, rows in problem.constraint_rows.items()},
             status=str(stats["return_status"]),
             # CasADi sets the count with the record of iterations; without one it is whatever memory held.

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import importlib.util
 import tempfile
 
 from casadi_hands.design import Design
+from casadi_hands.errors import HandsError
 from casadi_hands.pipeline.judge import Judge
 from casadi_hands.pipeline.record import Record
 from casadi_hands.pipeline.refinement import failing_fingers, refined_reason
@@ -17,6 +17,7 @@ from casadi_hands.stages.model import Model
 from casadi_hands.stages.refine import Margin, Refined, RefineStage
 from casadi_hands.stages.whole_hand import WholeHand
 from casadi_hands.verify import replay, replay_many
+from casadi_hands.verify.simulation import load_mujoco
 
 AMPLE = Margin()
 SMALL = Margin(friction=0.8, normal_force=0.25)
@@ -169,7 +170,12 @@ class Refiner:
 
     def _drops(self, design: Design) -> int:
         """How many perturbed replays of a certified design drop the object; 0 where there is no simulator to ask."""
-        if design.status != "certified" or importlib.util.find_spec("mujoco") is None:
+        if design.status != "certified":
+            return 0
+        try:
+            load_mujoco()
+        except HandsError as error:
+            self.record.say("refine", f"no replays: {error}")
             return 0
         with self.record.stage("refine", "replays of the certified motion"), tempfile.TemporaryDirectory() as scratch:
             design.save(scratch)

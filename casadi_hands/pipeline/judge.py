@@ -14,7 +14,7 @@ from casadi_hands.stages.floating import Floating
 from casadi_hands.stages.model import Model
 from casadi_hands.verify import audit
 
-FEASIBLE = {  # beyond these a motion is none: m, degrees, m·g
+FEASIBLE = {  # beyond these, where they are also beyond the limits, a motion is none: m, degrees, m·g
     "goal_position": 0.001,
     "goal_angle": 1.0,
     "residual": 0.1,
@@ -57,6 +57,6 @@ class Judge:
         planned = planned or design
         first = [self._friction, torque_reason(self.model, planned), speed_reason(self.model, planned)]
         reason = tell([*filter(None, first), *causes], missed_figures(design, verdict))
-        values = {name: certificate[name]["value"] for name in FEASIBLE if name in certificate}
-        possible = all(value is not None and value <= FEASIBLE[name] for name, value in values.items())
+        figures = {name: certificate[name] for name in FEASIBLE if name in certificate}
+        possible = all(f["holds"] or (f["value"] is not None and f["value"] <= FEASIBLE[n]) for n, f in figures.items())
         return replace(design, status="feasible" if possible else "failed", reason=reason, certificate=certificate)

@@ -59,6 +59,8 @@ _LIMITS = {  # by the constraint's kernel, without the finger's number, and name
     "contact.torque": _Limit(
         "supply its force within the torque limit", "torque", _TORQUE, ("torque", "unsupplied_force")
     ),
+    "ground_held.pressing": _Limit("stay pressed on the ground under the perturbation", "force", _PUSHED, ()),
+    "ground_held.cone": _Limit("stand on the ground without slipping under the perturbation", "", _PUSHED, ()),
     "held.pressing": _Limit("keep pressing under the perturbation", "force", _PUSHED, ()),
     "held.cone": _Limit("hold without slipping under the perturbation", "", _PUSHED, ()),
     "held.passive": _Limit("supply its force under the perturbation", "force", _SIDE, ()),
@@ -137,18 +139,12 @@ def _by(violation: float, unit: str, units: Units) -> str:
 
 def _when(model: Model, refined: Refined, kernel: str, constraint: str) -> str:
     """When a constraint is violated most; nothing where its rows are not known to be samples."""
-    values = refined.runs[-1][1].constraints.get(f"{kernel}.{constraint}")
+    excess = refined.runs[-1][1].excess.get(f"{kernel}.{constraint}")
     knots = _knots(model, refined, kernel)
-    if values is None or len(values) != len(knots):
+    if excess is None or len(excess) != len(knots):
         return ""
-    rows = values.reshape(len(values), -1)
-    if constraint in ("pressing", "cone", "clear"):  # bounded below
-        badness = -rows.min(axis=1)
-    else:  # bounded above, or an equation, or bounded alike on both sides
-        badness = rows.max(axis=1) if constraint == "facing" else np.abs(rows).max(axis=1)
-    if constraint == "pressing":  # of a finger that has just lifted no force is asked
-        badness = np.where(refined.hand.active[knots, _finger(kernel)], badness, -np.inf)
-    return f" at {moment(model.schedule, model.schedule.samples[knots[int(badness.argmax())]])}"
+    worst = excess.reshape(len(excess), -1).max(axis=1).argmax()
+    return f" at {moment(model.schedule, model.schedule.samples[knots[int(worst)]])}"
 
 
 def _finger(kernel: str) -> int:

@@ -9,8 +9,9 @@ from typing import Any
 import pytest
 
 from casadi_hands.design import Design
+from casadi_hands.errors import HandsError
 from casadi_hands.pipeline import certify
-from casadi_hands.pipeline.certify import REPLAYS, Certifier
+from casadi_hands.pipeline.certify import REPLAYS, Certifier, Refiner
 from casadi_hands.pipeline.record import Record
 from casadi_hands.search.algorithm import Candidate, Found
 from casadi_hands.stages.model import build_model
@@ -129,3 +130,17 @@ def test_a_design_there_is_already_is_better_than_a_hand_far_from_its_contacts(
     loop = Loop(monkeypatch, [], max_joints=3)
     known = replace(loop.record.design, status="certified", reason="known")
     assert loop.run(found((1, 1), farthest=0.31), ((0, REPLAYS), known)).reason == "known"
+
+
+def test_a_simulator_that_cannot_be_loaded_costs_no_certified_design(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail() -> None:
+        raise HandsError("MuJoCo cannot be loaded (no screen)")
+
+    told: list[str] = []
+    task = ball_task()
+    record = Record(task, None, lambda progress: told.append(progress.text))
+    anything: Any = None
+    monkeypatch.setattr(certify, "load_mujoco", fail)
+    refiner = Refiner(record, build_model(task), anything, 1)
+    assert refiner._drops(replace(record.design, status="certified")) == 0
+    assert told == ["no replays: MuJoCo cannot be loaded (no screen)"]

@@ -151,7 +151,7 @@ def test_friction_keeps_its_margin_on_fingers_and_ground(made_up: MadeUp) -> Non
 def test_a_result_has_every_contact_in_its_own_place(made_up: MadeUp) -> None:
     # The middle finger is not in use: its point stays, and it bears nothing.
     start, values = made_up.start, made_up.values
-    solution = replace(made_up_solution(values), violations={"a": ACCEPTED, "b": 0.0})
+    solution = replace(made_up_solution(values), excess={"a": np.array([ACCEPTED]), "b": np.zeros(2)})
     refined = made_up.stage._result(start, [("exact", solution)], {}, WEIGHTS)
     hand, count = refined.hand, len(start.position)
     for column, contact in enumerate((0, 2, 3)):
@@ -169,7 +169,7 @@ def test_a_result_has_every_contact_in_its_own_place(made_up: MadeUp) -> None:
 
 @pytest.mark.parametrize("violation", [1.01 * ACCEPTED, np.inf])
 def test_a_motion_that_violates_is_not_exact(made_up: MadeUp, violation: float) -> None:
-    solution = replace(made_up_solution(made_up.values), violations={"a": 0.0, "b": violation})
+    solution = replace(made_up_solution(made_up.values), excess={"a": np.zeros(1), "b": np.array([0.0, violation])})
     refined = made_up.stage._result(made_up.start, [("exact", solution)], {}, WEIGHTS)
     assert not refined.exact
     assert refined.worst == ("b", violation)

@@ -1,0 +1,37 @@
+"""Which status a design earns, on made-up audits."""
+
+from __future__ import annotations
+
+import pytest
+
+from casadi_hands.pipeline import judge
+from casadi_hands.pipeline.judge import Judge
+from casadi_hands.verify.report import Audit, Figure
+from tests.pipeline.test_holding import still, upright
+
+SLIPS = Figure("slip", 0.003, 0.0002, "m", "contact 'left' slips {value}")
+
+
+@pytest.mark.parametrize(
+    ("missed", "limit", "status"),
+    [
+        (0.0004, 0.0005, "feasible"),
+        (0.0009, 0.0005, "feasible"),
+        (0.003, 0.0005, "failed"),
+        (0.003, 0.005, "feasible"),  # within what this task's own limit allows
+        (0.006, 0.005, "failed"),
+        (float("inf"), 0.005, "failed"),
+    ],
+)
+def test_a_motion_is_one_within_the_task_s_limits_or_nearly(
+    missed: float, limit: float, status: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    goal = Figure("goal_position", missed, limit, "m", "the object is {value} away from goal 2")
+    verdict = Audit("ball", {"goal_position": goal, "slip": SLIPS}, ())
+    monkeypatch.setattr(judge, "audit", lambda _: verdict)
+    judged = Judge(*still(0.5)).judge(upright(0.0)[1], ())
+    assert judged.status == status
+    assert "contact 'left' slips 3 mm" in judged.reason
+    certain = Audit("ball", {"goal_position": Figure("goal_position", 0.0, limit, "m", "")}, ())
+    monkeypatch.setattr(judge, "audit", lambda _: certain)
+    assert Judge(*still(0.5)).judge(upright(0.0)[1], ()).status == "certified"
