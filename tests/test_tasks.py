@@ -11,9 +11,11 @@ from scipy.spatial.transform import Rotation
 
 from casadi_hands import Design, load_task, solve
 from casadi_hands.design import Motion
+from casadi_hands.task import Task
 from casadi_hands.verify import replay
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
+ABOUT_THE_TABLE = ("overhead", "from_the_side")
 Array = np.ndarray
 
 
@@ -74,6 +76,40 @@ def farthest_from_the_triangle(motion: Motion) -> float:
     corners = np.array([[0, 0, 0], [0.03, 0, 0], [0.015, 0.026, 0], [0, 0, 0]])
     distances = [[_from_segment(point, *side) for side in pairwise(corners)] for point in tip]
     return float(np.min(distances, axis=1).max())
+
+
+@pytest.mark.slow
+def test_the_top_finger_acts_only_against_the_push_towards_the_palm() -> None:
+    task = load_task(PROBLEMS / "sphere_rotation_and_translation.yaml")
+    pushed, free = (planned(each) for each in (task, task.model_copy(update={"perturbations": []})))
+    top = pushed.contact_names.index("top")
+    acting = pushed.time[pushed.contact_active[:, top]]
+    assert acting.min() == pytest.approx(8)
+    assert acting.max() == pytest.approx(12)
+    assert not free.contact_active[:, top].any()
+    for motion in (pushed, free):
+        assert np.delete(motion.contact_active, top, axis=1).all()
+
+
+@pytest.mark.slow
+def test_two_palms_turn_the_capsule_on_the_table_alike() -> None:
+    overhead, side = (planned(load_task(PROBLEMS / f"tabletop_rotation_{where}.yaml")) for where in ABOUT_THE_TABLE)
+    for name in ("object_position", "object_orientation", "contact_force", "contact_point_object"):
+        np.testing.assert_allclose(getattr(overhead, name), getattr(side, name), atol=1e-9)
+
+
+@pytest.mark.slow
+def test_poor_contacts_slip_more_on_the_pencil() -> None:
+    names = ("pencil_pick_up", "pencil_pick_up_poor_contacts")
+    good, poor = (solve(load_task(PROBLEMS / f"{name}.yaml"), until="whole_hand") for name in names)
+    assert good.certificate["slip"]["value"] < 0.7 * poor.certificate["slip"]["value"]
+
+
+def planned(task: Task) -> Motion:
+    """What stage 1 plans for a task."""
+    motion = solve(task, until="floating").motion
+    assert motion is not None
+    return motion
 
 
 def _from_segment(point: Array, start: Array, end: Array) -> float:

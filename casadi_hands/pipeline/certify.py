@@ -134,7 +134,7 @@ class Refiner:
         if drops > DROPS and margin != FIRM:
             text = f"again with a firmer grip: {drops} of {REPLAYS} replays dropped the object"
             with self.record.stage("refine", text):
-                firmer = self._attempt(stage, whole, FIRM, near)
+                firmer = self._attempt(stage, refined.hand, FIRM, near=True)
             again = self._judged(firmer, short, planned)
             fewer = self._drops(again) if again.status == "certified" else drops
             if fewer < drops:

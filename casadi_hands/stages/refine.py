@@ -27,7 +27,7 @@ _NEAR = (("nlp_scaling_method", "none"), ("bound_push", 1e-6), ("bound_frac", 1e
 # large one first wanders to the middle of all bounds and back; too small ones crawl along every bound they meet.
 SOFT = Options(max_iter=150, tol=1e-3, acceptable_tol=1e-2, constr_viol_tol=1e-4, mu_init=1e-3, extra=_NEAR)
 FIRM_SOLVE = Options(max_iter=150, tol=1e-3, acceptable_tol=1e-2, constr_viol_tol=1e-6, mu_init=1e-4, extra=_NEAR)
-HARD = Options(max_iter=300, tol=1e-4, acceptable_tol=1e-3, constr_viol_tol=1e-10, mu_init=1e-4, extra=_NEAR)
+HARD = Options(max_iter=200, tol=1e-4, acceptable_tol=1e-3, constr_viol_tol=1e-10, mu_init=1e-4, extra=_NEAR)
 EASED = 5  # knots over which a contact that touches or lifts comes to press with its full force, or to let go
 TOOL_TOLERANCE = 5e-3  # half extents, how far a drawing's tool may leave its path between goals
 ACCEPTED = 1e-7  # largest violation with which a refined motion is handed on
