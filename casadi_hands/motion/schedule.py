@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from casadi_hands.motion.spline import catmull_rom, held, linear
+from casadi_hands.motion.spline import catmull_rom, held
 
 Weights = NDArray[np.float64]
 
@@ -60,10 +60,6 @@ class Schedule:
     def spline(self, offset: float = 0.0, resting: ArrayLike = ()) -> Weights:
         """Catmull–Rom weights (S, N) at the samples, ``offset`` steps later, at rest at the keyframes ``resting``."""
         return catmull_rom(self.keyframes, self.samples + offset * self.step, resting)
-
-    def linear(self, offset: float = 0.0) -> Weights:
-        """Linear weights (S, N) at the samples, ``offset`` steps later."""
-        return linear(self.keyframes, self.samples + offset * self.step)
 
     def between(self, count: int) -> NDArray[np.float64]:
         """Times of the keyframes with ``count`` more between each pair, s."""

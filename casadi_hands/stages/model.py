@@ -21,6 +21,7 @@ STANDARD_GRAVITY = 9.81  # m/s², sets the force unit where a task has none
 _WITHIN = 0.9 / math.sqrt(3)  # share of a limit that each of three coordinates may use
 # Half extents. Beyond these a gap is no contact, and slip would need friction on its cone, whatever a task accepts.
 _MOST_GAP, _MOST_SLIP = 2e-4, 2e-3
+_NO_GROUND = -1e3  # half extents
 _DIGITS = 12  # significant digits kept, so that scaled tasks give the very same numbers
 
 
@@ -148,6 +149,11 @@ class Model:
             return self.regrasp.patches
         patches = self.patches if self.ground is None else np.vstack([self.patches, self.ground.patch])
         return np.tile(patches, (len(self.schedule.keyframes), 1, 1))
+
+    @property
+    def ground_height(self) -> float:
+        """Of the ground, or a height that no object reaches where there is none."""
+        return _NO_GROUND if self.ground is None else self.ground.height
 
     def slides(self, contact: int) -> bool:
         """Whether a finger's contact is planned to move on the object without lifting."""

@@ -14,7 +14,6 @@ from casadi_hands.stages import kernels
 from casadi_hands.stages.model import Model
 
 Array = NDArray[np.float64]
-NO_GROUND = -1e3  # a height no object reaches, half extents
 CLEARANCE = 0.02  # of object and palm, half extents
 GOAL_TOLERANCE = 5e-4  # half extents and rad, each coordinate: the task's cost alone gives way to slow accelerations
 MOST_FORCE = 20.0  # m·g, a bound on each component of a contact force
@@ -216,7 +215,7 @@ def object_parameters(model: Model) -> dict[str, Array | float]:
         "inertial": model.units.inertial,
         "friction": model.friction,
         "clearance": CLEARANCE,
-        "ground_height": NO_GROUND if ground is None else ground.height,
+        "ground_height": model.ground_height,
         "patches": model.keyframe_patches[model.schedule.sample_keyframes].reshape(sizes(model)[1], -1),
         "palm_position": model.palm_position,
         "palm_quaternion": model.palm_quaternion,

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from casadi_hands.design import Finger, Hand, Link, Motion
 from casadi_hands.kinematics import finger_kinematics
-from casadi_hands.motion import catmull_rom
 from casadi_hands.stages.floating import Floating
 from casadi_hands.stages.grasp import inward_normals, on_capsules
 from casadi_hands.stages.model import Model, quaternion
@@ -67,7 +66,7 @@ def _triple(vector: Array) -> tuple[float, float, float]:
 def floating_motion(model: Model, floating: Floating) -> Motion:
     """The object's motion of stage 1, with no joints and every contact's link named ``none``."""
     schedule = model.schedule
-    spline = catmull_rom(schedule.keyframes, schedule.samples)
+    spline = schedule.spline()
     pose = spline @ floating.pose
     count = len(schedule.samples)
     point = sampled_points(model, floating.point)

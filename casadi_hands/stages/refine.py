@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from casadi_hands.nlp import Options, Solution, Solver
 from casadi_hands.stages.model import Model
-from casadi_hands.stages.object_side import MOST_FORCE, MOST_TURN, NO_GROUND, tool_path
+from casadi_hands.stages.object_side import MOST_FORCE, MOST_TURN, tool_path
 from casadi_hands.stages.refine_problem import RefineProblem, Structure
 from casadi_hands.stages.start import balanced, rates_and_wrenches
 from casadi_hands.stages.whole_hand import WholeHand
@@ -261,7 +261,7 @@ class RefineStage:
             "inverse": np.linalg.inv(model.inertia).reshape(1, 9),
             "radius": model.link_radius,
             "palm_radius": model.palm_radius,
-            "ground_height": NO_GROUND if model.ground is None else model.ground.height,
+            "ground_height": model.ground_height,
             "friction": margin.friction * model.friction,
             "primitives": model.primitives.reshape(1, -1),
             "step": np.diff(model.schedule.samples)[:, None],

@@ -14,7 +14,6 @@ from casadi_hands.stages.grasp import inward_normals, on_capsules
 from casadi_hands.stages.model import Model, palm_from_world
 
 Array = NDArray[np.float64]
-_NO_GROUND = -1e3
 
 
 @dataclass(frozen=True)
@@ -97,8 +96,7 @@ class Target:
             moved = [np.concatenate([turn @ c[:3] + center, turn @ c[3:6] + center, c[6:]]) for c in model.primitives]
             primitives.append(np.concatenate(moved))
             up.append(rotation[:, 2])
-            height = _NO_GROUND if model.ground is None else model.ground.height
-            offset.append(height - position[2])
+            offset.append(model.ground_height - position[2])
         return np.array(primitives), np.array(up), np.array(offset)
 
 

@@ -10,7 +10,6 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from casadi_hands.motion import catmull_rom
 from casadi_hands.nlp import Options, Problem, Rows, Solution, Solver
 from casadi_hands.stages import hand_kernels as kernels
 from casadi_hands.stages.finger_numbers import contact_kinematics
@@ -18,7 +17,6 @@ from casadi_hands.stages.floating import Floating
 from casadi_hands.stages.grasp import inward_normals, on_capsules
 from casadi_hands.stages.model import Model, palm_from_world, quaternion
 from casadi_hands.stages.object_side import (
-    NO_GROUND,
     bind_object,
     declare_object,
     object_parameters,
@@ -192,7 +190,7 @@ class WholeHandStage:
             "highest": model.joint_limits[1],
             "margin": MARGIN,
             "all_primitives": model.primitives.reshape(1, -1),
-            "ground_height": NO_GROUND if model.ground is None else model.ground.height,
+            "ground_height": model.ground_height,
         }
         # A tenth of a second is short beside a palm's motion: the sample before stands for the time before.
         previous = np.clip(np.searchsorted(samples, samples - step - 1e-9), 0, None)
@@ -210,8 +208,8 @@ class WholeHandStage:
         model, values, schedule = self.model, solution.values, self.model.schedule
         contacts = sizes(model)[2]
         pose = values["pose"]
-        at_samples = catmull_rom(schedule.keyframes, schedule.samples) @ pose
-        joined = catmull_rom(schedule.keyframes, schedule.samples)
+        joined = schedule.spline()
+        at_samples = joined @ pose
         moved = tuple(
             FingerSeed(f.base, f.lengths, f.frames, f.axes, values[f"angles{c}"], f.tips)
             for c, f in zip(self.contacts, fingers, strict=True)
