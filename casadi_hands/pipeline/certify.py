@@ -69,7 +69,7 @@ class Certifier:
                     self.record.say("refine", f"not certified: {judged.reason}")
                 best = better(best, ranked(judged, drops))
                 failing |= failing_fingers(self.model, refined)
-                if refined.slips_hopelessly:
+                if refined.barely_rolls:
                     break  # a structure that must slip will do so in any of its hands
             least = self._more_joints(found, failing)
             if best is not None and (best[1].status == "certified" or least is None):

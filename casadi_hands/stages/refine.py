@@ -112,6 +112,11 @@ class Refined:
         """Whether the firm solves were left with so much slip that no exact one was tried."""
         return self.runs[-1][0] != "exact"
 
+    @property
+    def barely_rolls(self) -> bool:
+        """Whether rolling is out of the structure's reach, or so nearly that a firmer solve had to look for it."""
+        return self.slips_hopelessly or any(what == "firmer" for what, _ in self.runs)
+
 
 class RefineStage:
     """The stage for one structure: joints of each finger and when each contact, the ground's included, touches."""

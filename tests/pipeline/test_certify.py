@@ -52,7 +52,9 @@ class Loop(Certifier):
     def _certify(self, candidate: Candidate, short: Any) -> tuple[Design, Any, int]:
         missed, worst, slips = self.verdicts[len(self.tried)]
         self.tried.append(candidate.joints)
-        refined = SimpleNamespace(slips_hopelessly=slips, slips={"left": 1.0, "right": 0.1}, worst=(worst, 1.0))
+        refined = SimpleNamespace(
+            slips_hopelessly=slips, barely_rolls=slips, slips={"left": 1.0, "right": 0.1}, worst=(worst, 1.0)
+        )
         self.record.add_runs([{"stage": "refine", "what": len(self.tried)}])
         certificate = {str(i): {"holds": i >= missed} for i in range(9)}
         status = "failed" if missed else "certified"
