@@ -125,7 +125,7 @@ class Refiner:
         with self.record.stage("refine", "the same motion with exact physics, rolling contacts and clearance"):
             stage = RefineStage(self.model, whole.contacts, tuple(f.joints for f in whole.fingers), whole.active)
             refined = self._attempt(stage, whole, margin, near)
-        if not refined.exact and not refined.slips_hopelessly and margin != SMALL:
+        if not refined.exact and not refined.barely_rolls and margin != SMALL:
             with self.record.stage("refine", "again, closer to the limits of friction and grip"):
                 second = self._attempt(stage, whole, SMALL)
             refined = second if second.exact or second.worst[1] < refined.worst[1] else refined

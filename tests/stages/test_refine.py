@@ -220,6 +220,7 @@ def test_the_result_is_exact_and_the_audit_certifies_it(solved: Solved) -> None:
     assert solved.refined.exact
     assert solved.refined.worst[1] <= ACCEPTED
     assert not solved.refined.slips_hopelessly
+    assert not solved.refined.barely_rolls
     assert solved.verdict.reasons == []
     assert solved.verdict.certified
     assert [what for what, _ in solved.refined.runs] == ["soft", "firm", "exact"]
@@ -295,6 +296,7 @@ def test_one_joint_cannot_roll_with_the_object_and_no_exact_solve_is_tried(solve
     start = replace(whole, fingers=fingers, angles=tuple(angles[:, :1] for angles in whole.angles))
     refined = RefineStage(model, whole.contacts, (1, 1, 1), whole.active).solve(start)
     assert refined.slips_hopelessly
+    assert refined.barely_rolls
     assert not refined.exact
     assert max(refined.slips.values()) > HOPELESS
     assert [what for what, _ in refined.runs] == ["soft", "firm"]
