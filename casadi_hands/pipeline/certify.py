@@ -68,6 +68,7 @@ class Certifier:
                 if judged.status != "certified":
                     self.record.say("refine", f"not certified: {judged.reason}")
                 best = better(best, ranked(judged, drops))
+                self.record.keep_best(best[1])
                 failing |= failing_fingers(self.model, refined)
                 if refined.barely_rolls:
                     break  # a structure that must slip will do so in any of its hands

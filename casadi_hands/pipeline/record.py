@@ -44,6 +44,7 @@ class Record:
         self.task, self.out, self.report = task, out, report
         self.started = time.perf_counter()
         self.design = Design(task=task, status="failed", reason="nothing has been computed yet")
+        self.best: Design | None = None
 
     def say(self, stage: str, text: str) -> None:
         """Report progress."""
@@ -80,6 +81,15 @@ class Record:
         """An earlier design with all runs and all time spent until now."""
         seconds = {**self.design.seconds, "total": time.perf_counter() - self.started}
         return replace(design, stages=self.design.stages, seconds=seconds)
+
+    def keep_best(self, design: Design) -> None:
+        """Write a judged design, which nothing unfinished shall take the place of."""
+        self.best = design
+        self.keep(design)
+
+    def keep_unfinished(self, reason: str) -> None:
+        """Write the design as it stands, not judged yet, unless there is a better one to be kept."""
+        self.keep(self.best or replace(self.design, reason=reason))
 
     def keep(self, design: Design) -> Design:
         """Complete a design and write it, if there is a place for it."""

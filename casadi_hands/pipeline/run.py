@@ -64,8 +64,10 @@ def solve(
     record = Record(task, out, progress or (lambda _: None))
     with processes(jobs) if executor is None else nullcontext(executor) as workers:
         best = None if start is None else _refine_again(record, start)
-        if best is not None and serves(best[1], best[0][1]):
-            return record.keep(best[1])
+        if best is not None:
+            if serves(best[1], best[0][1]):
+                return record.keep(best[1])
+            record.keep_best(best[1])
         return record.keep(_run(record, until, workers, jobs, best))
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from concurrent.futures import Executor
-from dataclasses import replace
 
 from casadi_hands.pipeline.record import Record
 from casadi_hands.search.algorithm import Candidate, Found, Search, run_record
@@ -23,7 +22,7 @@ def run_floating(record: Record, model: Model) -> Floating:
     record.add_runs([run_record("floating", what, task.search.seed, what, s) for what, s in result.runs])
     record.set_costs("floating", result.solution, dict(task.weights.floating))
     record.update(motion=floating_motion(result.model, result))
-    record.keep(replace(record.design, reason="stopped before a hand was designed"))
+    record.keep_unfinished("stopped before a hand was designed")
     return result
 
 
@@ -65,7 +64,7 @@ def run_whole_hand(record: Record, model: Model, floating: Floating, candidate: 
     record.add_runs([run_record("whole_hand", "hand", task.search.seed, "", result.solution)])
     record.set_costs("whole_hand", result.solution, dict(task.weights.whole_hand))
     adopt(record, model, result)
-    record.keep(replace(record.design, reason="stopped before the motion was refined"))
+    record.keep_unfinished("stopped before the motion was refined")
     return result
 
 

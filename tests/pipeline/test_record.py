@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -52,3 +53,13 @@ def test_what_is_kept_is_written(tmp_path: Path) -> None:
     loaded = Design.load(tmp_path)
     assert loaded.reason == "nothing has been computed yet"
     assert loaded.seconds["total"] == pytest.approx(time.perf_counter() - kept.started, abs=5)
+
+
+def test_nothing_unfinished_takes_the_place_of_a_judged_design(tmp_path: Path) -> None:
+    kept = record([], tmp_path)
+    kept.keep_unfinished("stopped early")
+    assert Design.load(tmp_path).reason == "stopped early"
+    kept.keep_best(replace(kept.design, status="feasible", reason="slips a little"))
+    kept.keep_unfinished("stopped while another hand was tried")
+    loaded = Design.load(tmp_path)
+    assert (loaded.status, loaded.reason) == ("feasible", "slips a little")
