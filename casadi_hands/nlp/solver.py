@@ -50,7 +50,6 @@ class Solution:
         values: variable -> array.
         terms: cost term -> weighted value.
         objective: sum of the terms.
-        violation: largest violation of a constraint.
         excess: ``kernel.constraint`` -> how far each of its values is beyond its bounds; 0 within.
         constraints: ``kernel.constraint`` -> its values, one row an instance.
         status: IPOPT's own words; never taken as proof.
@@ -62,7 +61,6 @@ class Solution:
     values: dict[str, Vector]
     terms: dict[str, float]
     objective: float
-    violation: float
     excess: dict[str, Vector] = field(repr=False)
     constraints: dict[str, Vector] = field(repr=False)
     status: str
@@ -74,6 +72,11 @@ class Solution:
     def violations(self) -> dict[str, float]:
         """Largest violation of each ``kernel.constraint``."""
         return {name: float(excess.max(initial=0.0)) for name, excess in self.excess.items()}
+
+    @property
+    def violation(self) -> float:
+        """Largest violation of a constraint."""
+        return max(self.violations.values(), default=0.0)
 
 
 class Solver:
@@ -189,7 +192,6 @@ class Solver:
             values=problem.variables.unpack(x),
             terms=dict(zip(problem.terms, terms.tolist(), strict=True)),
             objective=float(f[0]) if np.isfinite(f[0]) else np.inf,
-            violation=float(beyond.max(initial=0.0)),
             excess={name: beyond[rows] for name, rows in problem.constraint_rows.items()},
             constraints={name: g[rows] for name, rows in problem.constraint_rows.items()},
             status=str(stats["return_status"]),

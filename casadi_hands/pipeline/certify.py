@@ -14,7 +14,9 @@ from casadi_hands.reasons import Reason
 from casadi_hands.search.algorithm import Candidate, Found, Search, run_record
 from casadi_hands.stages.floating import Floating
 from casadi_hands.stages.model import Model
-from casadi_hands.stages.refine import Margin, Refined, RefineStage
+from casadi_hands.stages.outcome import design_change
+from casadi_hands.stages.refine import Refined, RefineStage
+from casadi_hands.stages.refine_values import Margin
 from casadi_hands.stages.whole_hand import WholeHand
 from casadi_hands.verify import replay, replay_many
 from casadi_hands.verify.simulation import load_mujoco
@@ -135,24 +137,21 @@ class Refiner:
         if drops > DROPS and margin != FIRM:
             text = f"again with a firmer grip: {drops} of {REPLAYS} replays dropped the object"
             with self.record.stage("refine", text):
-                firmer = self._attempt(stage, refined.hand, FIRM, near=True)
+                firmer = self._attempt(stage, whole, FIRM, near=True, start=refined.hand)
             again = self._judged(firmer, short, planned)
             fewer = self._drops(again) if again.status == "certified" else drops
             if fewer < drops:
                 return again, firmer, fewer
         return judged, refined, drops
 
-    def _attempt(self, stage: RefineStage, whole: WholeHand, margin: Margin, near: bool = False) -> Refined:
-        """Refine with one margin, and record its solves whether they serve or not."""
-        result = stage.solve(whole, margin, near)
+    def _attempt(
+        self, stage: RefineStage, whole: WholeHand, margin: Margin, near: bool = False, start: WholeHand | None = None
+    ) -> Refined:
+        """Refine a whole hand with one margin, or from what it has become, and record all solves, served or not."""
+        result = stage.solve(start or whole, margin, near)
         what = f"hand, {margin.friction:g} of the friction and {margin.normal_force:g} weights of grip"
         runs = [run_record("refine", what, self.record.task.search.seed, step, s) for step, s in result.runs]
-        length = self.model.units.length
-        # What the refinement changed in each finger: base and lengths in m, axes in rad.
-        runs[-1]["design_change"] = {
-            finger: {"base": change["base"] * length, "lengths": change["lengths"] * length, "axes": change["axes"]}
-            for finger, change in result.moved.items()
-        }
+        runs[-1]["design_change"] = design_change(self.model, whole, result.hand)
         self.record.add_runs(runs)
         return result
 

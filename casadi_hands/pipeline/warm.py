@@ -19,7 +19,7 @@ from casadi_hands.search.seeds import frame_about
 from casadi_hands.stages.floating import Floating
 from casadi_hands.stages.grasp import inward_normals, on_capsules
 from casadi_hands.stages.model import Model, build_model, quaternion
-from casadi_hands.stages.refine import Margin, eased_in
+from casadi_hands.stages.refine_values import Margin, eased_in
 from casadi_hands.stages.synthesis import FingerSeed
 from casadi_hands.stages.whole_hand import WholeHand
 from casadi_hands.task import Task
@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 _NEARLY = 0.98  # margins are kept on surfaces whose kinks are rounded
 _STEPS = 4  # of Gauss and Newton
 _STIFF = 0.05  # half extents/rad, what keeps joints near their angles where that gains little
-_NOT_SOLVED = Solution({}, {}, 0.0, 0.0, {}, {}, "taken from an earlier result", 0, 0.0)
+_NOT_SOLVED = Solution({}, {}, 0.0, {}, {}, "taken from an earlier result", 0, 0.0)
 
 
 def warm_start(earlier: Design, task: Task, model: Model) -> WholeHand:

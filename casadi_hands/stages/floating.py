@@ -158,7 +158,7 @@ class FloatingStage:
             force=solution.values["force"].reshape(-1, contacts, 3),
             active=flags > 0.5,
             solution=solution,
-            runs=(*before.runs, ("regrasp", solution)),
+            runs=(*before.runs, ("regrasp" if self.model.regrasp.lifted.any() else "held back", solution)),
             model=self.model,
         )
 

@@ -58,6 +58,19 @@ def hand_of(
     )
 
 
+def design_change(model: Model, before: WholeHand, after: WholeHand) -> dict[str, dict[str, float]]:
+    """For each finger how far its base moved and its lengths changed at most, m, and its axes turned, rad."""
+    changes = {}
+    for contact, old, new in zip(before.contacts, before.fingers, after.fingers, strict=True):
+        cosines = np.clip((new.axis_vectors * old.axis_vectors).sum(axis=1), -1, 1)
+        changes[model.contact_names[contact]] = {
+            "base": float(np.linalg.norm(new.base - old.base)) * model.units.length,
+            "lengths": float(np.abs(new.lengths - old.lengths).max()) * model.units.length,
+            "axes": float(np.arccos(cosines).max()),
+        }
+    return changes
+
+
 def _triple(vector: Array) -> tuple[float, float, float]:
     x, y, z = vector.tolist()
     return x, y, z

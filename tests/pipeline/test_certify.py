@@ -11,11 +11,13 @@ import pytest
 from casadi_hands.design import Design
 from casadi_hands.errors import HandsError
 from casadi_hands.pipeline import certify
-from casadi_hands.pipeline.certify import REPLAYS, Certifier, Refiner
+from casadi_hands.pipeline.certify import FIRM, REPLAYS, Certifier, Refiner
 from casadi_hands.pipeline.record import Record
 from casadi_hands.search.algorithm import Candidate, Found
 from casadi_hands.stages.model import build_model
+from casadi_hands.stages.refine_values import Margin
 from tests.search.example import ball_target, ball_task, hand, pointing
+from tests.stages.example import made_up_solution
 
 Verdict = tuple[int, str, bool]  # limits missed, the constraint that was worst, whether it slips hopelessly
 
@@ -146,3 +148,21 @@ def test_a_simulator_that_cannot_be_loaded_costs_no_certified_design(monkeypatch
     refiner = Refiner(record, build_model(task), anything, 1)
     assert refiner._drops(replace(record.design, status="certified")) == 0
     assert told == ["no replays: MuJoCo cannot be loaded (no screen)"]
+
+
+def test_what_a_firmer_grip_changes_is_told_from_the_hand_before_any_refinement(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    whole, exact, firm = object(), object(), object()
+    asked: list[Any] = []
+
+    def solve(start: object, margin: Margin, near: bool) -> Any:
+        asked.append((start, margin, near))
+        return SimpleNamespace(hand=firm, runs=(("exact", made_up_solution({})),))
+
+    told: Any = {}
+    monkeypatch.setattr(certify, "design_change", lambda _, before, after: {"from": before, "to": after})
+    record, stage = Record(ball_task(), None, lambda _: None), SimpleNamespace(solve=solve)
+    Refiner(record, told, told, 1)._attempt(stage, whole, FIRM, near=True, start=exact)  # type: ignore[arg-type]
+    assert asked == [(exact, FIRM, True)]
+    assert record.design.stages[-1]["design_change"] == {"from": whole, "to": firm}

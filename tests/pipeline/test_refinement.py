@@ -35,7 +35,7 @@ def refined(
         contacts=(0, 1), fingers=(SimpleNamespace(joints=2), SimpleNamespace(joints=1)), active=active
     )
     slips = {"left": 0.02, "right": 0.4}
-    return Refined(hand, False, worst, slips, {}, ((step, solution),), {})  # type: ignore[arg-type]
+    return Refined(hand, False, worst, slips, ((step, solution),), {})  # type: ignore[arg-type]
 
 
 def test_an_exact_motion_needs_no_reason() -> None:

@@ -14,7 +14,7 @@ from casadi_hands.pipeline.certify import AMPLE, FIRM, SMALL
 from casadi_hands.pipeline.warm import as_floating, kept_margin, warm_start
 from casadi_hands.stages.model import build_model
 from casadi_hands.stages.outcome import hand_of, whole_hand_motion
-from casadi_hands.stages.refine import Margin
+from casadi_hands.stages.refine_values import Margin
 from casadi_hands.stages.whole_hand import WholeHand
 from casadi_hands.task import Task, parse_task
 from tests.export.example import BASES, LENGTHS, TASK, example_hand, example_motion

@@ -100,7 +100,6 @@ def made_up_solution(values: dict[str, Array], objective: float = 1.0, **terms: 
         values=values,
         terms=terms,
         objective=objective,
-        violation=0.0,
         excess={},
         constraints={},
         status="Solve_Succeeded",

@@ -8,7 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.stages.model import Model
-from casadi_hands.stages.refine import Margin, RefineStage
+from casadi_hands.stages.refine import RefineStage
+from casadi_hands.stages.refine_values import Margin
 from casadi_hands.stages.whole_hand import WholeHand
 from tests.stages.example import drawing, everything, made_up_finger, made_up_solution, project
 
@@ -50,7 +51,7 @@ class MadeUp:
         self.stage = RefineStage(model, contacts, (1, 2), self.active)
         self.values = {
             name: value + 0.05 * rng.normal(size=np.shape(value))
-            for name, value in self.stage._start(self.start).items()
+            for name, value in self.stage.given.start(self.start).items()
         }
         # Contacts near their surfaces that press, in no balance; torques that do not whirl a thin object round.
         chosen = self.stage.structure.columns
@@ -77,7 +78,7 @@ class MadeUp:
         return np.array([flags[k] & flags[max(k - 1, 0)] for k in range(len(flags))])
 
     def parameters(self, weights: Mapping[str, float], margin: Margin | None = None) -> dict[str, object]:
-        given = self.stage._parameters(self.start, margin or Margin())
+        given = self.stage.given.parameters(self.start, margin or Margin())
         terms = self.stage.problem.terms
         return {**given, **{f"weight.{name}": weight for name, weight in weights.items() if name in terms}}
 

@@ -14,18 +14,17 @@ from casadi_hands.design import Design
 from casadi_hands.stages import refine
 from casadi_hands.stages.floating import FloatingStage
 from casadi_hands.stages.model import Model, build_model
-from casadi_hands.stages.outcome import hand_of, joint_loads, whole_hand_motion
+from casadi_hands.stages.outcome import design_change, hand_of, joint_loads, whole_hand_motion
 from casadi_hands.stages.refine import (
     ACCEPTED,
+    FIRM,
     HARD,
     HOPELESS,
-    TOOL_TOLERANCE,
     WEIGHTS,
-    Margin,
     Refined,
     RefineStage,
-    longest_run,
 )
+from casadi_hands.stages.refine_values import TOOL_TOLERANCE, Margin, longest_run
 from casadi_hands.stages.whole_hand import WholeHand
 from casadi_hands.task import Task, load_task
 from casadi_hands.verify import Audit, audit
@@ -50,13 +49,13 @@ def drawn() -> MadeUp:
 
 
 def test_forces_vanish_where_contacts_bear_nothing_and_the_object_rests_at_both_ends(made_up: MadeUp) -> None:
-    lower, upper = made_up.stage._bounds()
+    lower, upper = made_up.stage.given.bounds()
     # One that touches anew, the second at sample 7, bears nothing yet: forces grow from zero.
     assert made_up.bearing[:, 1].tolist() == [True] * 4 + [False] * 4 + [True] * (len(upper["force"]) - 8)
     for column in range(3):
         for row in range(3 * column, 3 * column + 3):
             np.testing.assert_array_equal(upper["force"][:, row] == 0, ~made_up.bearing[:, column])
-    pushed = made_up.stage.pushed
+    pushed = made_up.stage.given.pushed
     np.testing.assert_array_equal(upper["force_pushed"], upper["force"][pushed])
     assert (upper["force_pushed"] == 0).any()
     np.testing.assert_array_equal(upper["rate"][[0, -1]], 0)
@@ -66,7 +65,7 @@ def test_forces_vanish_where_contacts_bear_nothing_and_the_object_rests_at_both_
 
 
 def test_goals_are_bounds_as_wide_as_the_task_allows(made_up: MadeUp) -> None:
-    lower, upper = made_up.stage._bounds()
+    lower, upper = made_up.stage.given.bounds()
     model = made_up.model
     at = [int(np.argmin(np.abs(model.schedule.samples - time))) for time in (0, 0.6, 1.5)]
     goals = np.hstack([model.goal_positions, model.goal_vectors])
@@ -78,9 +77,9 @@ def test_goals_are_bounds_as_wide_as_the_task_allows(made_up: MadeUp) -> None:
 
 
 def test_a_drawing_s_goals_bound_its_tool_and_not_its_pose(drawn: MadeUp) -> None:
-    lower, upper = drawn.stage._bounds()
+    lower, upper = drawn.stage.given.bounds()
     assert (upper["pose"] - lower["pose"] > 10).all()
-    always = drawn.stage._constraint_bounds(Margin())[0]
+    always = drawn.stage.given.constraint_bounds(Margin())[0]
     low, high = (np.asarray(bound) for bound in always["tool_point.on_path"])
     np.testing.assert_array_equal(low, -high)
     at = np.isin(np.round(drawn.model.schedule.samples, 9), [0, 0.7, 1.5])
@@ -90,7 +89,7 @@ def test_a_drawing_s_goals_bound_its_tool_and_not_its_pose(drawn: MadeUp) -> Non
 
 
 def test_margins_are_bounds_of_contacts_while_they_bear(made_up: MadeUp) -> None:
-    always, *others = made_up.stage._constraint_bounds(Margin(normal_force=0.7, passive=0.02))
+    always, *others = made_up.stage.given.constraint_bounds(Margin(normal_force=0.7, passive=0.02))
     low, high = always["contact2.pressing"]
     # Lifted in samples 4 to 6, so that it bears nothing in 4 to 7; within five knots of these it bears less.
     share = np.array([min(1.0, max(0, 4 - k, k - 7) / 5) for k in range(len(made_up.bearing))])
@@ -114,7 +113,7 @@ def test_the_longest_run_is_that_of_a_count() -> None:
 
 
 def test_steps_without_slip_add_up_to_less_than_the_task_allows(made_up: MadeUp) -> None:
-    always, *others = made_up.stage._constraint_bounds(Margin())
+    always, *others = made_up.stage.given.constraint_bounds(Margin())
     exact = {name: bounds for part in others for name, bounds in part.items()}
     allowed = 0.0002 / 0.0475
     for name, contact in (("rolling0", 0), ("rolling2", 2), ("ground_rolling", 3)):
@@ -128,7 +127,7 @@ def test_steps_without_slip_add_up_to_less_than_the_task_allows(made_up: MadeUp)
 
 
 def test_surfaces_touch_within_what_the_task_allows(made_up: MadeUp) -> None:
-    always, *others = made_up.stage._constraint_bounds(Margin())
+    always, *others = made_up.stage.given.constraint_bounds(Margin())
     problem = made_up.stage.problem
     low, high = problem.constraint_lower.copy(), problem.constraint_upper.copy()
     for part in (always, *others):
@@ -143,7 +142,7 @@ def test_surfaces_touch_within_what_the_task_allows(made_up: MadeUp) -> None:
 
 
 def test_friction_keeps_its_margin_on_fingers_and_ground(made_up: MadeUp) -> None:
-    given = made_up.stage._parameters(made_up.start, Margin(friction=0.25))
+    given = made_up.stage.given.parameters(made_up.start, Margin(friction=0.25))
     assert given["friction"] == pytest.approx(0.25 * 0.6)
     assert given["ground_friction"] == pytest.approx(0.25 * 0.4)
 
@@ -178,7 +177,7 @@ def test_a_motion_that_violates_is_not_exact(made_up: MadeUp, violation: float) 
 def test_a_start_that_is_no_number_is_never_accepted(drawn: MadeUp) -> None:
     # IPOPT does not even begin; what it says of such a solve is that nothing is violated.
     bad = replace(drawn.start, point=np.full_like(drawn.start.point, np.nan))
-    values = drawn.stage._start(drawn.start) | {"point": np.full_like(drawn.values["point"], np.nan)}
+    values = drawn.stage.given.start(drawn.start) | {"point": np.full_like(drawn.values["point"], np.nan)}
     solution = drawn.stage.solver.solve(values, drawn.parameters(WEIGHTS), HARD)
     assert solution.objective == np.inf
     assert solution.violations["wrench.sum"] == np.inf
@@ -253,12 +252,14 @@ def test_the_margins_are_kept(solved: Solved) -> None:
 def test_what_moved_is_told(solved: Solved) -> None:
     # The design is free: how far it went is a figure of the result, from start and end.
     length = solved.model.units.length
+    changes = design_change(solved.model, solved.whole, solved.refined.hand)
     for finger, contact, before in zip(
         solved.refined.hand.fingers, solved.refined.hand.contacts, solved.whole.fingers, strict=True
     ):
-        moved = solved.refined.moved[solved.model.contact_names[contact]]
-        assert moved["base"] == pytest.approx(np.hypot(*(finger.base - before.base)), rel=1e-9)
-        assert moved["lengths"] == pytest.approx(np.abs(finger.lengths - before.lengths).max(), rel=1e-9)
+        moved = changes[solved.model.contact_names[contact]]
+        assert moved["base"] == pytest.approx(length * np.hypot(*(finger.base - before.base)), rel=1e-9)
+        assert moved["lengths"] == pytest.approx(length * np.abs(finger.lengths - before.lengths).max(), rel=1e-9)
+        assert min(moved.values()) > 0
         turned = [
             Rotation.align_vectors([a], [b])[0].magnitude()
             for a, b in zip(finger.axis_vectors, before.axis_vectors, strict=True)
@@ -300,6 +301,7 @@ def test_one_joint_cannot_roll_with_the_object_and_no_exact_solve_is_tried(solve
     assert not refined.exact
     assert max(refined.slips.values()) > HOPELESS
     assert [what for what, _ in refined.runs] == ["soft", "firm"]
+    assert refined.weights == WEIGHTS | FIRM
 
 
 def test_an_exact_motion_stays_itself_by_the_short_way(solved: Solved) -> None:
@@ -311,8 +313,8 @@ def test_an_exact_motion_stays_itself_by_the_short_way(solved: Solved) -> None:
     assert solved.refined.weights["stay_design"] < again.weights["stay_design"]
     # The hand is held where it is, which the long way does not do.
     first, second = (
-        max(moved[part] for moved in each.moved.values() for part in ("base", "lengths", "axes"))
-        for each in (solved.refined, again)
+        max(change for moved in design_change(model, *hands).values() for change in moved.values())
+        for hands in ((solved.whole, before), (before, again.hand))
     )
     assert second < 0.2 * first
     np.testing.assert_allclose(again.hand.position, before.position, atol=0.02)

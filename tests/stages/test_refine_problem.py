@@ -79,7 +79,7 @@ def test_a_contact_is_held_to_its_surfaces_until_it_lifts(loaded: MadeUp) -> Non
     assert len(rows["apart_touching2.clear"]) == touching[:, 1].sum()
     assert len(rows["fingers_apart2_0.clear"]) == len(active)
     pushed = (loaded.model.schedule.samples > 0.3 - 1e-9) & (loaded.model.schedule.samples < 0.9 + 1e-9)
-    np.testing.assert_array_equal(loaded.stage.pushed, np.flatnonzero(pushed))
+    np.testing.assert_array_equal(loaded.stage.given.pushed, np.flatnonzero(pushed))
     for name, contact in (("held0", 0), ("held2", 2), ("ground_held", 3)):
         assert len(rows[f"{name}.pressing"]) == (pushed & active[:, contact]).sum() > 0
 
@@ -108,7 +108,7 @@ def test_pushes_are_held_at_their_time(loaded: MadeUp) -> None:
     second = values["force_pushed"].reshape(-1, 3, 3)
     found = loaded.constraints(WEIGHTS)["pushed.sum"]
     assert len(found) == len(second)
-    for row, k, forces in zip(found, loaded.stage.pushed, second, strict=True):
+    for row, k, forces in zip(found, loaded.stage.given.pushed, second, strict=True):
         inverse = loaded.turns[k].inv()
         force = forces.sum(axis=0) + inverse.apply(model.perturbation_force[k])
         torque = np.cross(loaded.points[k], forces).sum(axis=0) + inverse.apply(model.perturbation_torque[k])
@@ -132,7 +132,7 @@ def test_the_ground_is_where_it_is_while_it_bears_load(loaded: MadeUp) -> None:
         path = (loaded.turns[k].apply(over) + loaded.turns[k + 1].apply(over)) / 2
         np.testing.assert_allclose(row, (path - world[k + 1] + world[k])[:2], atol=1e-12)
     second = loaded.values["force_pushed"].reshape(-1, 3, 3)[:, 2]
-    held = [(k, f) for k, f in zip(loaded.stage.pushed, second, strict=True) if loaded.active[k, 3]]
+    held = [(k, f) for k, f in zip(loaded.stage.given.pushed, second, strict=True) if loaded.active[k, 3]]
     expected = [loaded.turns[k].apply(f)[2] for k, f in held]
     np.testing.assert_allclose(found["ground_held.pressing"].ravel(), expected, atol=1e-12)
 

@@ -102,6 +102,7 @@ def test_a_ball_that_two_fingers_cannot_hold_is_turned_with_contacts_held_back()
     assert floating.active.all()
     assert not floating.model.regrasp.lifted.any()
     seen = np.einsum("kij,kcj->kci", Rotation.from_rotvec(floating.pose[:, 3:]).as_matrix(), floating.point)
+    np.testing.assert_allclose(np.linalg.norm(seen, axis=2), 1.0, atol=0.1)
     assert (seen * seen[:1]).sum(axis=2).min() > np.cos(FARTHEST)
 
 

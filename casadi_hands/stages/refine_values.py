@@ -1,0 +1,186 @@
+"""What a refine problem is solved with: bounds, parameters, and the values that it starts from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from casadi_hands.stages.object_side import MOST_FORCE, MOST_TURN, tool_path
+from casadi_hands.stages.refine_problem import RefineProblem
+from casadi_hands.stages.start import balanced, rates_and_wrenches
+from casadi_hands.stages.whole_hand import WholeHand
+
+Array = NDArray[np.float64]
+EASED = 5  # knots over which a contact that touches or lifts comes to press with its full force, or to let go
+TOOL_TOLERANCE = 5e-3  # half extents, how far a drawing's tool may leave its path between goals
+SLIDING_TIE = 0.3  # of a contact to where it was planned to slide; it shall roll if it can
+Bounds = dict[str, tuple[ArrayLike, ArrayLike]]
+
+
+@dataclass(frozen=True)
+class Margin:
+    """How far inside its limits a motion must stay; exact motions can still balance on a fingertip.
+
+    Attributes:
+        friction: share of μ that may be used.
+        normal_force: least normal force of an active contact, m·g.
+        passive: largest component of a force that no joint supplies, m·g.
+    """
+
+    friction: float = 0.5
+    normal_force: float = 1.0
+    passive: float = 0.0075
+
+
+class RefineValues:
+    """The numbers of one structure's problem, for any motion to start from and any margin."""
+
+    def __init__(self, built: RefineProblem) -> None:
+        self.structure, self.model = built.structure, built.structure.model
+        self.problem, self.pushed, self.knots = built.problem, built.pushed, built.knots
+        # A contact that touches anew bears nothing until it does: its force grows from zero.
+        active = self.structure.active
+        self.bearing = active & np.vstack([active[:1], active[:-1]])
+
+    def constraint_bounds(self, margin: Margin) -> tuple[Bounds, Bounds]:
+        """Bounds of constraints: those that hold in every solve, and those of the exact one.
+
+        Contact and rolling are met within a small part of the task's limits. Where joints have one freedom less than
+        the motion needs, or a motion in a plane meets some of them twice, equations would have no solver's solution.
+        """
+        structure, model = self.structure, self.model
+        always: Bounds = {}
+        exact: Bounds = {}
+        for i, c in enumerate(structure.contacts):
+            floor = margin.normal_force * eased_in(self.bearing[:, i])[structure.touching[:, i]]
+            always[f"contact{c}.pressing"] = (floor[:, None], np.inf)
+            # The point stays on the object's surface, where its force acts; the link may be a little off it.
+            exact[f"contact{c}.on_link"] = (-model.gap_tolerance, model.gap_tolerance)
+            slip = model.slip_tolerance / (np.sqrt(2) * longest_run(structure.active[:, i]))
+            exact[f"rolling{c}.no_slip"] = (-slip, slip)
+            for kernel in ("contact", "held"):
+                if f"{kernel}{c}.passive" in self.problem.constraint_rows:
+                    exact[f"{kernel}{c}.passive"] = (-margin.passive, margin.passive)
+        if structure.grounded:
+            slip = model.slip_tolerance / (np.sqrt(2) * longest_run(structure.active[:, -1]))
+            exact["ground_rolling.no_slip"] = (-slip, slip)
+        if model.tool is not None:
+            tolerance = np.full((self.knots, 3), TOOL_TOLERANCE)
+            tolerance[model.schedule.keyframe_samples[list(model.schedule.goals)]] = model.goal_tolerance[0]
+            always["tool_point.on_path"] = (-tolerance, tolerance)
+        return always, exact
+
+    def bounds(self) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Lower and upper bounds of variables: goals, rest at both ends, no force where there is no contact."""
+        model, schedule = self.model, self.model.schedule
+        count = len(schedule.samples)
+        pose = np.tile([np.inf] * 3 + [MOST_TURN] * 3, (count, 1))
+        low_pose, high_pose = -pose, pose
+        if model.tool is None:
+            goals = np.hstack([model.goal_positions, model.goal_vectors])
+            at, tolerance = schedule.keyframe_samples[list(schedule.goals)], np.repeat(model.goal_tolerance, 3)
+            low_pose[at], high_pose[at] = goals - tolerance, goals + tolerance
+        rate = np.full((count, 6), np.inf)
+        rate[[0, -1]] = 0.0
+        force = np.repeat(np.where(self.bearing, MOST_FORCE, 0.0), 3, axis=1)
+        upper = {"rate": rate, "force": force}
+        if len(self.pushed):
+            upper["force_pushed"] = force[self.pushed]
+        lower = {name: -bound for name, bound in upper.items()}
+        return {"pose": low_pose, **lower}, {"pose": high_pose, **upper}
+
+    def start(self, motion: WholeHand) -> dict[str, Array]:
+        """Values of all variables: the motion, with velocities and forces that nearly obey it."""
+        count, chosen = self.knots, self.structure.columns
+        rates, wrenches = rates_and_wrenches(self.model, motion.position, motion.vector)
+        points = motion.point[:, chosen]
+        forces = balanced(points, motion.force[:, chosen], self.bearing, wrenches)
+        values = {
+            "pose": np.hstack([motion.position, motion.vector]),
+            "rate": rates,
+            "point": points.reshape(count, -1),
+            "force": forces.reshape(count, -1),
+            "wrench": np.hstack([forces.sum(axis=1), np.cross(points, forces).sum(axis=1)]),
+        }
+        at, pushing = ((a[1:] + a[:-1]) / 2 for a in (points, forces))
+        values["middle_torque"] = np.cross(at, pushing).sum(axis=1)
+        if len(self.pushed):
+            values["force_pushed"] = values["force"][self.pushed]
+        for c, finger, angles in zip(self.structure.contacts, motion.fingers, motion.angles, strict=True):
+            values |= {f"angles{c}": angles, f"base{c}": finger.base, f"lengths{c}": finger.lengths}
+            values[f"axes{c}"] = finger.axes.reshape(1, -1)
+        return values
+
+    def parameters(self, motion: WholeHand, margin: Margin) -> dict[str, ArrayLike]:
+        """Values of all parameters but the weights; the motion is where costs hold what may be elsewhere."""
+        model = self.model
+        values: dict[str, ArrayLike] = {
+            "reference": model.reference,
+            "gravity": model.gravity,
+            "inertial": model.units.inertial,
+            "inertia": model.inertia.reshape(1, 9),
+            "inverse": np.linalg.inv(model.inertia).reshape(1, 9),
+            "radius": model.link_radius,
+            "palm_radius": model.palm_radius,
+            "ground_height": model.ground_height,
+            "friction": margin.friction * model.friction,
+            "primitives": model.primitives.reshape(1, -1),
+            "step": np.diff(model.schedule.samples)[:, None],
+            "palm_position": motion.palm_position,
+            "palm_quaternion": motion.palm_quaternion,
+            "wanted_pose": np.hstack([motion.position, motion.vector]),
+        }
+        if len(self.pushed):
+            values["push_force"] = model.perturbation_force[self.pushed]
+            values["push_torque"] = model.perturbation_torque[self.pushed]
+        if model.tool is None:
+            values["goals"] = np.hstack([model.goal_positions, model.goal_vectors])
+        else:
+            values["tool"], values["tool_path"] = model.tool, tool_path(model)
+        if self.structure.grounded and model.ground is not None:
+            values["ground_friction"] = margin.friction * model.ground.friction
+            values[f"capsule{model.contacts}"] = model.ground.capsule
+        for c in self.structure.columns:
+            values[f"wanted_point{c}"], values[f"wanted_force{c}"] = motion.point[:, c], motion.force[:, c]
+        for c, finger in zip(self.structure.contacts, motion.fingers, strict=True):
+            values[f"frames{c}"] = finger.frames.transpose(0, 2, 1).reshape(1, -1)
+            values[f"wanted_base{c}"], values[f"wanted_lengths{c}"] = finger.base, finger.lengths
+            values[f"wanted_axes{c}"] = finger.axes.reshape(1, -1)
+            values[f"capsule{c}"] = model.capsules[c]
+            values[f"tie{c}"] = SLIDING_TIE if model.slides(c) else 1.0
+            values[f"helper{c}"] = _helpers(motion.point[:, c], model.capsules[c])
+        return values
+
+
+def eased_in(bearing: NDArray[np.bool_]) -> Array:
+    """Share (S,) of the normal force asked of a contact: it grows after a touch and falls before a lift, over knots."""
+    idle = np.flatnonzero(~bearing)
+    if not len(idle):
+        return np.ones(len(bearing))
+    away = np.abs(np.arange(len(bearing))[:, None] - idle).min(axis=1)
+    return np.asarray(np.minimum(away / EASED, 1.0))
+
+
+def longest_run(flags: NDArray[np.bool_]) -> int:
+    """Length of the longest stretch of set flags (S,); 1 where none is set."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
+    return max(1, int((edges[1::2] - edges[::2]).max(initial=1)))
+
+
+def _helpers(points: Array, capsule: Array) -> Array:
+    """Vectors (S, 3) well across the surface normal at each contact point, continuous along the motion."""
+    along = capsule[3:6] - capsule[:3]
+    helper = along / np.linalg.norm(along) if np.linalg.norm(along) > 1e-9 else np.eye(3)[0]
+    helpers = []
+    for point in points:
+        normal = point - capsule[:3] - np.clip((point - capsule[:3]) @ along / max(along @ along, 1e-12), 0, 1) * along
+        normal /= np.linalg.norm(normal)
+        across = helper - (helper @ normal) * normal
+        if np.linalg.norm(across) < 0.5:
+            across = np.eye(3)[np.argmin(np.abs(normal))]
+            across = across - (across @ normal) * normal
+        helper = across / np.linalg.norm(across)
+        helpers.append(helper)
+    return np.array(helpers)
