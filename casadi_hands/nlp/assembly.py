@@ -58,8 +58,10 @@ def kernel_functions(kernel: Kernel, terms: list[str]) -> KernelFunctions:
     x, p = kernel.variables, kernel.parameters
     weights, scale = SX.sym("weights", len(terms)), SX.sym("scale")
     values = ca.vertcat(*[kernel.terms[name] for name in terms]) if terms else SX.zeros(0, 1)
-    total = ca.dot(weights, values) if terms else SX(0)
     g = ca.vertcat(*kernel.constraints.values()) if kernel.constraints else SX.zeros(0, 1)
+    # What stands twice in them stands many times in their derivatives.
+    values, g = ca.cse([values, g])
+    total = ca.dot(weights, values) if terms else SX(0)
     multipliers = SX.sym("multipliers", g.numel())
     jacobian = ca.jacobian(g, x)
     hessian, _ = ca.hessian(scale * total + ca.dot(multipliers, g), x)

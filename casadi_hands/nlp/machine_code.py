@@ -27,7 +27,7 @@ from casadi import Function
 log = logging.getLogger(__name__)
 # No contraction of a*b+c: a compiled kernel rounds as the interpreted one does.
 _FLAGS = ("-fPIC", "-shared", "-ffp-contract=off")
-_LARGE = 20_000  # instructions beyond which optimising takes longer than it will ever save
+_LARGE = 20_000  # instructions beyond which full optimising takes longer than it will ever save
 _reported: set[type[Exception]] = set()
 
 
@@ -64,7 +64,7 @@ def compiled(name: str, functions: dict[str, Function]) -> dict[str, Function]:
     c_compiler = compiler()
     if c_compiler is None:
         return functions
-    flags = ("-O0" if sum(f.n_instructions() for f in functions.values()) > _LARGE else "-O1", *_FLAGS)
+    flags = ("-Og" if sum(f.n_instructions() for f in functions.values()) > _LARGE else "-O1", *_FLAGS)
     try:
         library = cache_folder() / f"{_key(functions, c_compiler, flags)}.so"
         if not _intact(library):

