@@ -38,14 +38,15 @@ class Schedule:
         A motion that goes on after its last goal gets one more stretch of keyframes to its end.
         """
         ends = list(goal_times) + ([duration] if duration > goal_times[-1] + 1e-9 else [])
-        keyframes, samples = [ends[0]], [ends[0]]
+        keyframes = [ends[0]]
         for start, end in itertools.pairwise(ends):
-            inner = np.linspace(start, end, between + 2)
-            keyframes += list(inner[1:])
-            for a, b in itertools.pairwise(inner):
-                samples += list(np.linspace(a, b, max(1, math.ceil((b - a) / step - 1e-6)) + 1)[1:])
+            keyframes += list(np.linspace(start, end, between + 2)[1:])
         goals = tuple(i * (between + 1) for i in range(len(goal_times)))
-        return cls(np.array(keyframes), np.array(samples), goals, step)
+        return cls(np.array(keyframes), _samples(keyframes, step), goals, step)
+
+    def stepped(self, step: float) -> Schedule:
+        """The same keyframes with samples at most ``step`` seconds apart."""
+        return Schedule(self.keyframes, _samples(self.keyframes.tolist(), step), self.goals, step)
 
     @property
     def keyframe_samples(self) -> NDArray[np.int64]:
@@ -65,3 +66,11 @@ class Schedule:
         """Times of the keyframes with ``count`` more between each pair, s."""
         parts = [np.linspace(a, b, count + 2)[:-1] for a, b in itertools.pairwise(self.keyframes)]
         return np.append(np.concatenate(parts), self.keyframes[-1])
+
+
+def _samples(keyframes: Sequence[float], step: float) -> NDArray[np.float64]:
+    """All keyframes, and evenly between two neighbours as few times as leave none more than ``step`` apart."""
+    samples = [keyframes[0]]
+    for a, b in itertools.pairwise(keyframes):
+        samples += list(np.linspace(a, b, max(1, math.ceil((b - a) / step - 1e-6)) + 1)[1:])
+    return np.array(samples)

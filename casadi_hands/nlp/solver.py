@@ -35,8 +35,8 @@ class Options:
         named = {
             name: getattr(self, name) for name in ("max_iter", "tol", "acceptable_tol", "constr_viol_tol", "mu_init")
         }
-        # AMD ordering is a quarter to a third faster than MUMPS's own choice on these banded systems; little more memory
-        # than it says it needs, instead of ten times that, saves another tenth.
+        # AMD ordering is a quarter to a third faster than MUMPS's own choice on these banded systems; little more than
+        # the memory that it says it needs, instead of ten times that, saves another tenth.
         return {
             "print_level": 0,
             "sb": "yes",

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
 
 from casadi_hands.design import Design
 from casadi_hands.errors import HandsError
@@ -12,11 +16,13 @@ from casadi_hands.pipeline.refinement import failing_fingers, refined_reason
 from casadi_hands.pipeline.steps import adopt, run_search, run_whole_hand
 from casadi_hands.reasons import Reason
 from casadi_hands.search.algorithm import Candidate, Found, Search, run_record
-from casadi_hands.stages.floating import Floating
+from casadi_hands.stages.continuation import Continuation
+from casadi_hands.stages.floating import Floating, FloatingStage
 from casadi_hands.stages.model import Model
 from casadi_hands.stages.outcome import design_change
-from casadi_hands.stages.refine import Refined, RefineStage
+from casadi_hands.stages.refine import Refined
 from casadi_hands.stages.refine_values import Margin
+from casadi_hands.stages.sampling import shortened
 from casadi_hands.stages.whole_hand import WholeHand
 from casadi_hands.verify import replay, replay_many
 from casadi_hands.verify.simulation import load_mujoco
@@ -27,6 +33,7 @@ FIRM = Margin(normal_force=2.0)
 REPLAYS = 12  # perturbed ones, that a certified design is tried on
 DROPS = 1  # of them, that pass
 OUT_OF_REACH = 0.3  # half extents that a finger misses its contact by: nothing is left to refine
+SURELY = np.pi / 2  # that an object may turn so that contacts can surely go with it
 HANDS_REFINED = 2  # hands of one structure that are tried before fingers get another joint
 Ranked = tuple[tuple[int, int], Design]
 
@@ -81,9 +88,15 @@ class Certifier:
             found = run_search(self.record, self.model, self.search, least)
 
     def _certify(self, candidate: Candidate, short: tuple[Reason, ...]) -> tuple[Design, Refined, int]:
-        """Find a hand's motion and refine it."""
-        whole = run_whole_hand(self.record, self.model, self.floating, candidate)
-        return self.refiner.certify(whole, short)
+        """Find a hand's motion and refine it; where contacts cannot go with the object, from a shorter one on."""
+        share = _within_reach(self.model) if self.model.held_back else 1.0
+        if share == 1:
+            whole = run_whole_hand(self.record, self.model, self.floating, candidate)
+        else:
+            model, weights = shortened(self.model, share), dict(self.record.task.weights.floating)
+            floating = FloatingStage(model).solve(weights)
+            whole = run_whole_hand(self.record, model, floating, candidate)
+        return self.refiner.certify(whole, short, share=share)
 
     def _more_joints(self, found: Found, failing: set[str]) -> dict[int, int] | None:
         """Joints of each finger for the next round; None when no failing finger may have more."""
@@ -111,7 +124,12 @@ class Refiner:
         self.record, self.model, self.judge, self.jobs = record, model, judge, jobs
 
     def certify(
-        self, whole: WholeHand, short: tuple[Reason, ...], margin: Margin = AMPLE, near: bool = False
+        self,
+        whole: WholeHand,
+        short: tuple[Reason, ...],
+        margin: Margin = AMPLE,
+        near: bool = False,
+        share: float = 1.0,
     ) -> tuple[Design, Refined, int]:
         """Refine one hand with a margin, with a small one where that fails, with more where a replay drops.
 
@@ -120,35 +138,35 @@ class Refiner:
             short: what its fingers could not do before.
             margin: the first to be tried.
             near: whether the motion is nearly exact already.
+            share: of the way to its goals that the motion goes.
 
         Returns:
             the design, its refinement, and how many of its replays drop the object.
         """
         planned = self.record.design
+        stage = Continuation(self.model, whole.contacts, tuple(f.joints for f in whole.fingers), whole.active)
+        again = partial(stage.solve if share == 1 else partial(stage.lengthen, share=share), whole)
         with self.record.stage("refine", "the same motion with exact physics, rolling contacts and clearance"):
-            stage = RefineStage(self.model, whole.contacts, tuple(f.joints for f in whole.fingers), whole.active)
-            refined = self._attempt(stage, whole, margin, near)
+            refined = self._attempt(whole, margin, partial(again, near=True) if near else again)
         if not refined.exact and not refined.barely_rolls and margin != SMALL:
             with self.record.stage("refine", "again, closer to the limits of friction and grip"):
-                second = self._attempt(stage, whole, SMALL)
-            refined = second if second.exact or second.worst[1] < refined.worst[1] else refined
+                second = self._attempt(whole, SMALL, again)
+            refined = second if second.exact or second.misses_less_than(refined) else refined
         judged = self._judged(refined, short, planned)
         drops = self._drops(judged)
         if drops > DROPS and margin != FIRM:
             text = f"again with a firmer grip: {drops} of {REPLAYS} replays dropped the object"
             with self.record.stage("refine", text):
-                firmer = self._attempt(stage, whole, FIRM, near=True, start=refined.hand)
-            again = self._judged(firmer, short, planned)
-            fewer = self._drops(again) if again.status == "certified" else drops
+                firmer = self._attempt(whole, FIRM, partial(stage.solve, refined.hand, near=True))
+            again_judged = self._judged(firmer, short, planned)
+            fewer = self._drops(again_judged) if again_judged.status == "certified" else drops
             if fewer < drops:
-                return again, firmer, fewer
+                return again_judged, firmer, fewer
         return judged, refined, drops
 
-    def _attempt(
-        self, stage: RefineStage, whole: WholeHand, margin: Margin, near: bool = False, start: WholeHand | None = None
-    ) -> Refined:
-        """Refine a whole hand with one margin, or from what it has become, and record all solves, served or not."""
-        result = stage.solve(start or whole, margin, near)
+    def _attempt(self, whole: WholeHand, margin: Margin, way: Callable[..., Refined]) -> Refined:
+        """Refine with one margin, and record all solves, whether they serve or not."""
+        result = way(margin=margin)
         what = f"hand, {margin.friction:g} of the friction and {margin.normal_force:g} weights of grip"
         runs = [run_record("refine", what, self.record.task.search.seed, step, s) for step, s in result.runs]
         runs[-1]["design_change"] = design_change(self.model, whole, result.hand)
@@ -182,6 +200,12 @@ class Refiner:
             if replay(scratch).dropped:
                 return REPLAYS
             return sum(r.dropped for r in replay_many(scratch, REPLAYS, jobs=self.jobs))
+
+
+def _within_reach(model: Model) -> float:
+    """The share of the way to its goals over which an object turns by less than fingers can go with it."""
+    turns = np.linalg.norm(model.goal_vectors - model.goal_vectors[0], axis=1)
+    return float(min(1.0, SURELY / max(turns.max(), 1e-9)))
 
 
 def serves(design: Design, drops: int) -> bool:

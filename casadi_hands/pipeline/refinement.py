@@ -5,9 +5,6 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from casadi_hands.reasons import Reason, joints_of
 from casadi_hands.search.shortcoming import moment
 from casadi_hands.stages.model import Model, Units
@@ -93,7 +90,7 @@ def failing_fingers(model: Model, refined: Refined) -> set[str]:
     if refined.slips_hopelessly:
         most = max(refined.slips.values())
         return {name for name, slip in refined.slips.items() if slip > 0.3 * most}
-    numbers = map(int, re.findall(r"\d+", refined.worst[0].split(".")[0]))
+    numbers = map(int, re.findall(r"\d+", refined.worst.constraint.split(".")[0]))
     return {model.contact_names[number] for number in numbers if number < model.contacts}
 
 
@@ -101,27 +98,31 @@ def refined_reason(model: Model, refined: Refined) -> list[Reason]:
     """Why a refined motion is not exact; nothing if it is."""
     if refined.exact:
         return []
+    if refined.share < 1:
+        what = f"fingers can roll with the object over {refined.share:.0%} of the way to its goals, and no farther"
+        advice = f"{_JOINTS}, thicker links (hand.link_radius) or a smaller turn of the object"
+        return [Reason(what, advice, frozenset(("goal_position", "goal_angle")))]
     joints = {
         model.contact_names[c]: f.joints for c, f in zip(refined.hand.contacts, refined.hand.fingers, strict=True)
     }
     if refined.slips_hopelessly:
-        worst = max(refined.slips, key=lambda name: refined.slips[name])
-        slip = 1e3 * refined.slips[worst] * model.units.length
-        what = f"finger '{worst}' with {joints_of(joints[worst])} cannot roll with the object: it slips {slip:.1f} mm"
+        most = max(refined.slips, key=lambda name: refined.slips[name])
+        slip = 1e3 * refined.slips[most] * model.units.length
+        what = f"finger '{most}' with {joints_of(joints[most])} cannot roll with the object: it slips {slip:.1f} mm"
         follow = ("friction_excess", "pull", "unsupplied_force", "disturbance_radius", "penetration")
         rolling = _LIMITS["rolling.no_slip"]
         return [Reason(what, rolling.advice, frozenset((*rolling.explains, *follow)))]
-    (name, violation), who = refined.worst, sorted(failing_fingers(model, refined))
-    kernel, constraint = name.split(".")
+    worst, who = refined.worst, sorted(failing_fingers(model, refined))
+    kernel, constraint = worst.constraint.split(".")
     limit = _LIMITS.get(f"{re.sub(r'[0-9_]+$', '', kernel)}.{constraint}")
     if limit is None:
-        limit = _Limit(f"meet {name}", "", f"{_JOINTS} or slower goals", ())
+        limit = _Limit(f"meet {worst.constraint}", "", f"{_JOINTS} or slower goals", ())
     fingers = " and ".join(f"'{finger}'" for finger in who)
     subject = f"finger{'s' if len(who) > 1 else ''} {fingers}" if who else "the object"
-    when = _when(model, refined, kernel, constraint)
+    when = "" if worst.time is None else f" at {moment(model.schedule, worst.time)}"
     what = (
         f"no exact motion was found with {'+'.join(map(str, joints.values()))} joints: "
-        f"{subject} cannot {limit.cannot}{when}{_by(violation, limit.unit, model.units)}"
+        f"{subject} cannot {limit.cannot}{when}{_by(worst.violation, limit.unit, model.units)}"
     )
     return [Reason(what, limit.advice, frozenset(limit.explains))]
 
@@ -135,31 +136,3 @@ def _by(violation: float, unit: str, units: Units) -> str:
     if unit == "torque":
         return f", by {violation * units.torque:.2g} N·m"
     return f", by {violation:.2g} rad/s" if unit == "speed" else ""
-
-
-def _when(model: Model, refined: Refined, kernel: str, constraint: str) -> str:
-    """When a constraint is violated most; nothing where its rows are not known to be samples."""
-    excess = refined.runs[-1][1].excess.get(f"{kernel}.{constraint}")
-    knots = _knots(model, refined, kernel)
-    if excess is None or len(excess) != len(knots):
-        return ""
-    worst = excess.reshape(len(excess), -1).max(axis=1).argmax()
-    return f" at {moment(model.schedule, model.schedule.samples[knots[int(worst)]])}"
-
-
-def _finger(kernel: str) -> int:
-    """The contact in a kernel's name; of two the last, -1 (the ground's) where there is none."""
-    number = re.search(r"(\d+)$", kernel)
-    return int(number[1]) if number else -1
-
-
-def _knots(model: Model, refined: Refined, kernel: str) -> NDArray[np.int64]:
-    """The samples that a kernel's instances stand for: all, all but the last, or those where its contact touches."""
-    count = len(model.schedule.samples)
-    name = re.sub(r"[0-9_]+$", "", kernel)
-    if name in ("contact", "apart_touching", "rolling", "ground", "ground_rolling"):
-        active = refined.hand.active[:, _finger(kernel)]
-        if name.endswith("rolling"):
-            return np.flatnonzero(active[:-1])
-        return np.flatnonzero(active | np.append(False, active[:-1]))
-    return np.arange(count - 1 if name in ("physics", "middle_torque") else count)

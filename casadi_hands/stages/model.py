@@ -161,6 +161,11 @@ class Model:
             return False
         return bool(np.any(self.regrasp.patches[:, contact] != self.regrasp.patches[0, contact]))
 
+    @property
+    def held_back(self) -> bool:
+        """Whether contacts are planned to stay behind while the object turns on beneath fingers that cannot let go."""
+        return self.regrasp is not None and not self.regrasp.lifted.any()
+
     def point_spline(self, contact: int, offset: float = 0.0) -> Array:
         """(S, N) weights of a contact point at the samples, ``offset`` steps later.
 

@@ -1,10 +1,9 @@
 """Stage 4, beyond the thesis: the same motion as a hard-constrained problem at dense knots, the morphology free.
 
-Newton–Euler by shooting, contact on both surfaces with opposed normals, rolling without slip, friction cones with a
-margin, a floor on normal forces, forces that joints supply with a lever, clearance: all constraints. Reached by
+Newton–Euler from knot to knot, contact on both surfaces with opposed normals, rolling without slip, friction cones with
+a margin, a floor on normal forces, forces that joints supply with a lever, clearance: all constraints. Reached by
 continuation: rolling and supply first as soft costs, then as firm ones, then as constraints. (Straight from soft to
-hard, the solver was seen to turn fingers to the object's other side.) A motion that was exact for nearly the same task
-is near enough for the last one or two of these.
+hard, the solver was seen to turn fingers to the object's other side.)
 """
 
 from __future__ import annotations
@@ -19,6 +18,7 @@ from casadi_hands.nlp import Options, Solution, Solver
 from casadi_hands.stages.model import Model
 from casadi_hands.stages.refine_problem import RefineProblem, Structure
 from casadi_hands.stages.refine_values import Margin, RefineValues
+from casadi_hands.stages.sampling import shortened
 from casadi_hands.stages.whole_hand import WholeHand
 
 _NEAR = (("nlp_scaling_method", "none"), ("bound_push", 1e-6), ("bound_frac", 1e-6))
@@ -60,7 +60,21 @@ LONG_WAY: tuple[Step, ...] = (
 )
 # From an exact motion to one nearby; the first step can be left out where joints can follow and supply their forces.
 SHORT_WAY: tuple[Step, ...] = (("firm", WEIGHTS | FIRM | STAY, FIRM_SOLVE), ("exact", WEIGHTS | EXACT | STAY, HARD))
-SERVES = 0.1  # cost of slip and of forces that no joint supplies, of the start, in the short way's first step
+
+
+@dataclass(frozen=True)
+class Worst:
+    """The constraint that a solve violates most.
+
+    Attributes:
+        constraint: ``kernel.constraint``.
+        violation: in the constraint's own unit.
+        time: s, of the knot where it is; None where the constraint has no time.
+    """
+
+    constraint: str
+    violation: float
+    time: float | None
 
 
 @dataclass(frozen=True)
@@ -70,28 +84,34 @@ class Refined:
     Attributes:
         hand: as the whole-hand stage's, with the design as it is now.
         exact: whether every constraint is met within ``ACCEPTED``.
-        worst: (constraint, violation) of the last solve.
+        worst: of the last solve.
         slips: for each contact the slip that its last soft solve was left with, half extents.
         runs: every solve: (what, solution).
         weights: of the terms in the last.
+        share: of the way to its goals that the motion goes.
     """
 
     hand: WholeHand
     exact: bool
-    worst: tuple[str, float]
+    worst: Worst
     slips: dict[str, float]
     runs: tuple[tuple[str, Solution], ...]
     weights: dict[str, float]
+    share: float = 1.0
+
+    def misses_less_than(self, other: Refined) -> bool:
+        """Whether the motion goes farther, or as far with less violation."""
+        return (-self.share, self.worst.violation) < (-other.share, other.worst.violation)
 
     @property
     def slips_hopelessly(self) -> bool:
         """Whether the firm solves were left with so much slip that no exact one was tried."""
-        return self.runs[-1][0] != "exact"
+        return not self.runs[-1][0].endswith("exact")
 
     @property
     def barely_rolls(self) -> bool:
         """Whether rolling is out of the structure's reach, or so nearly that a firmer solve had to look for it."""
-        return self.slips_hopelessly or any(what == "firmer" for what, _ in self.runs)
+        return self.slips_hopelessly or any(what.endswith("firmer") for what, _ in self.runs)
 
 
 class RefineStage:
@@ -102,39 +122,23 @@ class RefineStage:
     ) -> None:
         self.model, self.contacts = model, contacts
         self.structure = Structure.of(model, contacts, joints, active)
-        built = RefineProblem(self.structure)
-        self.problem, self.given, self.solver = built.problem, RefineValues(built), Solver(built.problem)
+        self.built = RefineProblem(self.structure)
+        self.problem, self.given = self.built.problem, RefineValues(self.built, model)
+        self.solver = Solver(self.problem)
 
-    def solve(self, start: WholeHand, margin: Margin | None = None, near: bool = False) -> Refined:
-        """Refine a whole-hand motion: rolling and supply soft, then firm, then constraints.
+    def take(self, way: tuple[Step, ...], start: WholeHand, margin: Margin, share: float = 1.0) -> Refined:
+        """Solve step by step; not to the end where firm solves show rolling to be out of reach.
 
         Args:
-            start: the motion.
+            way: solves, each from where the one before ended.
+            start: the motion to begin with.
             margin: to keep to the limits.
-            near: whether the motion is nearly exact already, and the hand shall stay nearly what it is: then the short
-                way is tried first.
+            share: of the way from the first goal to each of the others.
         """
-        margin = margin or Margin()
-        if not near:
-            return self._take(LONG_WAY, start, margin)
-        parameters = self.given.parameters(start, margin) | self._weighted(SHORT_WAY[0][1])
-        costs = self.solver.evaluate(self.given.start(start), parameters)
-        ways: tuple[tuple[Step, ...], ...] = (SHORT_WAY, LONG_WAY)
-        if costs["slip"] + costs["passive_force"] < SERVES:
-            ways = (SHORT_WAY[1:], *ways)
-        runs: tuple[tuple[str, Solution], ...] = ()
-        for way in ways:
-            refined = self._take(way, start, margin)
-            runs += refined.runs
-            if refined.exact:
-                break
-        return replace(refined, runs=runs)
-
-    def _take(self, way: tuple[Step, ...], start: WholeHand, margin: Margin) -> Refined:
-        """Solve step by step; not to the end where firm solves show rolling to be out of reach."""
-        values, parameters = self.given.start(start), self.given.parameters(start, margin)
-        lower, upper = self.given.bounds()
-        always, exact = self.given.constraint_bounds(margin)
+        given = self.given if share == 1 else RefineValues(self.built, shortened(self.model, share))
+        values, parameters = given.start(start), given.parameters(start, margin)
+        lower, upper = given.bounds()
+        always, exact = given.constraint_bounds(margin)
         runs: list[tuple[str, Solution]] = []
         slips: dict[str, float] = {}
         most = 0.0
@@ -151,7 +155,12 @@ class RefineStage:
             values, used = solution.values, weights
             if what != "exact":
                 slips = self._slips(solution)
-        return self._result(start, runs, slips or self._slips(solution), used)
+        return replace(self._result(start, runs, slips or self._slips(solution), used), share=share)
+
+    def costs(self, step: Step, start: WholeHand, margin: Margin) -> dict[str, float]:
+        """The weighted terms of a motion, as a step weights them."""
+        parameters = self.given.parameters(start, margin) | self._weighted(step[1])
+        return self.solver.evaluate(self.given.start(start), parameters)
 
     def _weighted(self, weights: Mapping[str, float]) -> dict[str, ArrayLike]:
         return {f"weight.{term}": weights[term] / self.given.knots for term in self.problem.terms}
@@ -192,6 +201,15 @@ class RefineStage:
             active=active,
             solution=solution,
         )
-        worst = max(solution.violations.items(), key=lambda item: item[1])
-        exact = runs[-1][0] == "exact" and worst[1] <= ACCEPTED
+        worst = self._worst(solution)
+        exact = runs[-1][0] == "exact" and worst.violation <= ACCEPTED
         return Refined(hand, exact, worst, slips, tuple(runs), weights)
+
+    def _worst(self, solution: Solution) -> Worst:
+        name, violation = max(solution.violations.items(), key=lambda item: item[1])
+        knots = self.built.knots_of.get(name.split(".")[0])
+        if knots is None:
+            return Worst(name, violation, None)
+        excess = solution.excess[name]
+        instance = int(excess.reshape(len(knots), -1).max(axis=1).argmax())
+        return Worst(name, violation, float(self.model.schedule.samples[knots[instance]]))

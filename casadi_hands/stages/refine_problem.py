@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from casadi_hands.nlp import Problem, Rows
+from casadi_hands.nlp import Kernel, Problem, Rows
 from casadi_hands.stages import exact_kernels as finger
 from casadi_hands.stages import exact_object as body
 from casadi_hands.stages.model import Model
@@ -64,11 +65,20 @@ class Structure:
 
 
 class RefineProblem:
-    """The problem of one structure; ``problem`` holds it, the rest are the rows that kernels read."""
+    """The problem of one structure.
+
+    Attributes:
+        structure: it is built for.
+        problem: its variables, parameters and blocks.
+        knots: their number.
+        pushed: those at which the task's perturbations act.
+        knots_of: for each block with constraints the knot of each of its instances; none where a block has no time.
+    """
 
     def __init__(self, structure: Structure) -> None:
         """Declare variables and parameters and bind every block."""
         self.structure, self.problem = structure, Problem()
+        self.knots_of: dict[str, NDArray[np.int64]] = {}
         model = structure.model
         self.knots = len(model.schedule.samples)
         self.pushed = pushed_knots(model)
@@ -142,22 +152,35 @@ class RefineProblem:
         positions = [self.problem.parameters[name] for name in names]
         return [p if knots is None or len(p) == 1 else p[knots] for p in positions]
 
+    def _bind(
+        self,
+        knots: NDArray[np.int64],
+        kernel: Kernel,
+        rows: list[Rows],
+        parameters: list[NDArray[np.int64]],
+        bounds: Mapping[str, tuple[ArrayLike, ArrayLike]],
+    ) -> None:
+        """Bind a block, and keep the knot that each of its instances is at, or begins at."""
+        self.problem.bind(kernel, rows, parameters, bounds)
+        self.knots_of[kernel.name] = knots
+
     # The object.
 
     def _bind_physics(self) -> None:
         problem, columns = self.problem, len(self.structure.columns)
-        now, later = np.arange(self.knots - 1), np.arange(1, self.knots)
+        every, now, later = np.arange(self.knots), np.arange(self.knots - 1), np.arange(1, self.knots)
         states = [r.take(k) for k in (now, later) for r in (self.pose, self.rate)]
         wrenches = [self.wrench.take(now), self.wrench.take(later), self.middle]
         common = self._at(("reference", "step", "gravity", "inertial", "inertia", "inverse"))
-        problem.bind(body.physics(), [*states, *wrenches], common, {"defect": (0, 0)})
-        problem.bind(body.wrench(columns), [self.wrench, self.point, self.force], [], {"sum": (0, 0)})
+        self._bind(now, body.physics(), [*states, *wrenches], common, {"defect": (0, 0)})
+        self._bind(every, body.wrench(columns), [self.wrench, self.point, self.force], [], {"sum": (0, 0)})
         inner = np.arange(self.knots - 2)
         problem.bind(body.object_jerk(), [self.rate.take(inner + k) for k in range(3)], self._at(("step",), inner))
-        still = [r.take([0, self.knots - 1]) for r in (self.pose, self.wrench)]
-        problem.bind(body.equilibrium(), still, self._at(("reference", "gravity")), {"sum": (0, 0)})
-        ends = [r.take(k) for k in (now, later) for r in (self.point, self.force)]
-        problem.bind(body.middle_torque(columns), [self.middle, *ends], [], {"sum": (0, 0)})
+        ends = np.array([0, self.knots - 1])
+        still = [r.take(ends) for r in (self.pose, self.wrench)]
+        self._bind(ends, body.equilibrium(), still, self._at(("reference", "gravity")), {"sum": (0, 0)})
+        contacts = [r.take(k) for k in (now, later) for r in (self.point, self.force)]
+        self._bind(now, body.middle_torque(columns), [self.middle, *contacts], [], {"sum": (0, 0)})
         problem.bind(body.force_change(columns), [self.force.take(now), self.force.take(later)])
         problem.bind(body.stay_on_path(), [self.pose], self._at(("wanted_pose",)))
         if len(self.pushed):
@@ -165,14 +188,14 @@ class RefineProblem:
                 problem.parameter(f"push_{kind}", (len(self.pushed), 3))
             rows = [self.pose.take(self.pushed), self.wrench.take(self.pushed), self.point.take(self.pushed), self.push]
             external = self._at(("reference", "push_force", "push_torque"))
-            problem.bind(body.pushed(columns), rows, external, {"sum": (0, 0)})
+            self._bind(self.pushed, body.pushed(columns), rows, external, {"sum": (0, 0)})
 
     def _bind_object(self) -> None:
         problem, model = self.problem, self.structure.model
         kernel = body.object_apart(len(model.primitives), model.ground is not None)
         places = ("reference", "palm_position", "palm_quaternion", "palm_radius", "ground_height", "primitives")
         bounds = {"palm": (CLEARANCE, np.inf), "ground": (-GOAL_TOLERANCE, np.inf)}
-        problem.bind(kernel, [self.pose], self._at(places), bounds)
+        self._bind(np.arange(self.knots), kernel, [self.pose], self._at(places), bounds)
         if model.tool is None:
             goals = problem.parameter("goals", (len(model.goal_positions), 6))
             at = model.schedule.keyframe_samples[list(model.schedule.goals)]
@@ -181,7 +204,7 @@ class RefineProblem:
             problem.parameter("tool", (1, 3))
             problem.parameter("tool_path", (self.knots, 3))
             parameters = self._at(("reference", "tool", "tool_path"))
-            problem.bind(body.tool_point(), [self.pose], parameters, {"on_path": _FREE})
+            self._bind(np.arange(self.knots), body.tool_point(), [self.pose], parameters, {"on_path": _FREE})
 
     def _bind_ground(self) -> None:
         problem, structure = self.problem, self.structure
@@ -192,14 +215,15 @@ class RefineProblem:
         rows = [r.take(touching) for r in (self.pose, self.point.entries(*span), self.force.entries(*span))]
         names = ("reference", f"capsule{c}", "ground_height", "ground_friction", f"wanted_point{c}", f"wanted_force{c}")
         surfaces = {"on_surfaces": (0, 0), "opposed": (0, 0), "facing": (-np.inf, -0.5)}
-        problem.bind(body.ground_contact(), rows, self._at(names, touching), surfaces | _HELD)
+        self._bind(touching, body.ground_contact(), rows, self._at(names, touching), surfaces | _HELD)
         start = np.flatnonzero(structure.active[:-1, column])
         rows = [r.take(k) for k in (start, start + 1) for r in (self.pose, self.point.entries(*span))]
-        problem.bind(body.ground_rolling(), rows, self._at(("reference", "step"), start), {"no_slip": _FREE})
+        self._bind(start, body.ground_rolling(), rows, self._at(("reference", "step"), start), {"no_slip": _FREE})
         pushed = np.flatnonzero(structure.active[self.pushed, column])
         if len(pushed):
-            rows = [self.pose.take(self.pushed[pushed]), self.push.take(pushed).entries(*span)]
-            problem.bind(body.ground_held(), rows, self._at(("reference", "ground_friction")), _HELD)
+            knots = self.pushed[pushed]
+            rows = [self.pose.take(knots), self.push.take(pushed).entries(*span)]
+            self._bind(knots, body.ground_held(), rows, self._at(("reference", "ground_friction")), _HELD)
 
     # The fingers.
 
@@ -207,7 +231,7 @@ class RefineProblem:
         return self._at(("reference", "palm_position", "palm_quaternion", f"capsule{c}", "radius"), knots)
 
     def _bind_contact(self, i: int) -> None:
-        problem, structure = self.problem, self.structure
+        structure = self.structure
         c, n, torque = structure.contacts[i], structure.joints[i], structure.model.torque_limit
         frames, shape, span = self._at((f"frames{c}",)), self.shape[i], (3 * i, 3 * i + 3)
         point, angles = self.point.entries(*span), self.angles[i]
@@ -222,22 +246,22 @@ class RefineProblem:
         surfaces = {"on_object": (0.0, 0.0), "on_link": (0.0, 0.0)}
         kernel = finger.contact(n, c, np.isfinite(torque))
         variables = rows(touching, self.pose, point, self.force.entries(*span), angles)
-        problem.bind(kernel, variables, parameters, surfaces | held)
+        self._bind(touching, kernel, variables, parameters, surfaces | held)
         pushed = np.flatnonzero(structure.active[self.pushed, i])
         if len(pushed):
             knots = self.pushed[pushed]
             variables = [*rows(knots, self.pose, point, angles), self.push.take(pushed).entries(*span)]
             parameters = [*frames, *self._scene(c, knots), *self._at(("friction",))]
-            problem.bind(finger.held(n, c, np.isfinite(torque)), variables, parameters, held)
+            self._bind(knots, finger.held(n, c, np.isfinite(torque)), variables, parameters, held)
         start = np.flatnonzero(structure.active[:-1, i])
         variables = rows(start, self.pose, point, angles)
         variables += [r.take(start + 1) for r in (self.pose, point, angles)]
         parameters = [*frames, *self._scene(c, start), *self._scene(c, start + 1)]
         parameters += self._at((f"helper{c}", "step"), start)
-        problem.bind(finger.rolling(n, c), variables, parameters, {"no_slip": _FREE})
+        self._bind(start, finger.rolling(n, c), variables, parameters, {"no_slip": _FREE})
 
     def _bind_clearance(self, i: int) -> None:
-        problem, structure, model = self.problem, self.structure, self.structure.model
+        structure, model = self.structure, self.structure.model
         c, n = structure.contacts[i], structure.joints[i]
         touched = int(np.argmin(np.abs(model.primitives - model.capsules[c]).sum(axis=1)))
         touching, idle = structure.touching[:, i], np.flatnonzero(~structure.active[:-1, i])
@@ -254,7 +278,7 @@ class RefineProblem:
         def bind(knots: NDArray[np.int64], rows: list[Rows], least: float, skipped: int | None, between: bool) -> None:
             kernel = finger.apart(n, len(model.primitives), c, skipped, model.ground is not None, between)
             rows = [*[r.constant(len(knots)) for r in self.shape[i]], *rows]
-            problem.bind(kernel, rows, self._at((f"frames{c}", *names), knots), {"clear": (least, np.inf)})
+            self._bind(knots, kernel, rows, self._at((f"frames{c}", *names), knots), {"clear": (least, np.inf)})
 
         for knots, skipped in ((np.flatnonzero(touching), touched), (np.flatnonzero(~touching), None)):
             if len(knots):
@@ -272,7 +296,9 @@ class RefineProblem:
         mirrored = np.where(inner < 0, 1, np.where(inner >= count, count - 2, inner))
         three = [self.angles[i].take(mirrored[offset : offset + count]) for offset in range(3)]
         steps = self._at(("step",), np.clip(np.arange(count) - 1, 0, count - 2))
-        problem.bind(finger.joint_motion(n, c, np.isfinite(speed)), three, steps, {"speed": (-speed, speed)})
+        self._bind(
+            np.arange(count), finger.joint_motion(n, c, np.isfinite(speed)), three, steps, {"speed": (-speed, speed)}
+        )
         switches = np.flatnonzero(np.diff(structure.active[:, i].astype(int))) + 1
         first = np.array([k for k in range(count - 3) if k + 1 not in switches and k + 2 not in switches], int)
         four = [self.angles[i].take(first + offset) for offset in range(4)]
@@ -289,7 +315,7 @@ class RefineProblem:
             rows += [*[r.constant(self.knots) for r in self.shape[k]], self.angles[k]]
         kernel = finger.fingers_apart(structure.joints[i], structure.joints[j], f"{c}_{d}")
         parameters = self._at((f"frames{c}", f"frames{d}", "radius"))
-        self.problem.bind(kernel, rows, parameters, {"clear": (CLEARANCE, np.inf)})
+        self._bind(np.arange(self.knots), kernel, rows, parameters, {"clear": (CLEARANCE, np.inf)})
 
 
 def pushed_knots(model: Model) -> NDArray[np.int64]:

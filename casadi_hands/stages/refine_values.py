@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from casadi_hands.stages.model import Model
 from casadi_hands.stages.object_side import MOST_FORCE, MOST_TURN, tool_path
 from casadi_hands.stages.refine_problem import RefineProblem
 from casadi_hands.stages.start import balanced, rates_and_wrenches
@@ -35,10 +36,15 @@ class Margin:
 
 
 class RefineValues:
-    """The numbers of one structure's problem, for any motion to start from and any margin."""
+    """The numbers of one structure's problem, for any motion to start from and any margin.
 
-    def __init__(self, built: RefineProblem) -> None:
-        self.structure, self.model = built.structure, built.structure.model
+    Args:
+        built: the problem.
+        model: the task that it was built for, or one that differs in its goals only.
+    """
+
+    def __init__(self, built: RefineProblem, model: Model) -> None:
+        self.structure, self.model = built.structure, model
         self.problem, self.pushed, self.knots = built.problem, built.pushed, built.knots
         # A contact that touches anew bears nothing until it does: its force grows from zero.
         active = self.structure.active

@@ -1,0 +1,84 @@
+"""A task and a motion of it at other samples, or over a part of its way: easier problems that start the one asked for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from casadi_hands.motion import catmull_rom, held, linear
+from casadi_hands.stages.model import Model
+from casadi_hands.stages.whole_hand import WholeHand
+
+Array = NDArray[np.float64]
+
+
+def resampled_model(model: Model, step: float) -> Model:
+    """The task with samples at most ``step`` seconds apart."""
+    schedule = model.schedule.stepped(step)
+    was, now = model.schedule.samples, schedule.samples
+    between, last = catmull_rom(was, now), held(was, now)
+    quaternion = between @ model.palm_quaternion
+    return replace(
+        model,
+        schedule=schedule,
+        palm_position=between @ model.palm_position,
+        palm_quaternion=quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True),
+        perturbation_force=model.perturbation_force[last],
+        perturbation_torque=model.perturbation_torque[last],
+    )
+
+
+def resampled(hand: WholeHand, before: Model, after: Model) -> WholeHand:
+    """A motion at the samples of the same task with others."""
+    was, now = before.schedule.samples, after.schedule.samples
+    between = catmull_rom(was, now)
+    quaternion = between @ hand.palm_quaternion
+    return replace(
+        hand,
+        angles=tuple(between @ angles for angles in hand.angles),
+        palm_position=between @ hand.palm_position,
+        palm_quaternion=quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True),
+        position=between @ hand.position,
+        vector=between @ hand.vector,
+        point=np.tensordot(between, hand.point, axes=1),
+        force=np.tensordot(linear(was, now), hand.force, axes=1),
+        active=hand.active[held(was, now)],
+    )
+
+
+def shortened(model: Model, share: float) -> Model:
+    """The task over a share of the way from its first goal to each of the others; no contact is planned to move."""
+    positions, vectors = (goals[0] + share * (goals - goals[0]) for goals in (model.goal_positions, model.goal_vectors))
+    return replace(model, goal_positions=positions, goal_vectors=vectors, regrasp=None)
+
+
+def extrapolated(first: WholeHand, second: WholeHand, by: float) -> WholeHand:
+    """The second motion and ``by`` times what it differs by from the first, of one hand."""
+
+    def beyond(a: Array, b: Array) -> Array:
+        return b + by * (b - a)
+
+    return replace(
+        second,
+        angles=tuple(beyond(a, b) for a, b in zip(first.angles, second.angles, strict=True)),
+        position=beyond(first.position, second.position),
+        vector=beyond(first.vector, second.vector),
+        point=beyond(first.point, second.point),
+    )
+
+
+def at_rest(hand: WholeHand) -> WholeHand:
+    """A motion that stays where the given one starts."""
+
+    def still(values: Array) -> Array:
+        return np.repeat(values[:1], len(values), axis=0)
+
+    return replace(
+        hand,
+        angles=tuple(still(angles) for angles in hand.angles),
+        position=still(hand.position),
+        vector=still(hand.vector),
+        point=still(hand.point),
+    )
