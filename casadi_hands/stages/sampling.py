@@ -1,4 +1,4 @@
-"""A task and a motion of it at other samples, or over a part of its way: easier problems that start the one asked for."""
+"""A task and a motion of it at other samples, or over a part of its way: easier problems to begin with."""
 
 from __future__ import annotations
 
