@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,6 +16,7 @@ from casadi_hands.pipeline.certify import FIRM, REPLAYS, Certifier, Refiner
 from casadi_hands.pipeline.record import Record
 from casadi_hands.search.algorithm import Candidate, Found
 from casadi_hands.stages.model import build_model
+from casadi_hands.stages.refine import Worst
 from casadi_hands.stages.refine_values import Margin
 from tests.search.example import ball_target, ball_task, hand, pointing
 from tests.stages.example import made_up_solution
@@ -55,7 +57,11 @@ class Loop(Certifier):
         missed, worst, slips = self.verdicts[len(self.tried)]
         self.tried.append(candidate.joints)
         refined = SimpleNamespace(
-            slips_hopelessly=slips, barely_rolls=slips, slips={"left": 1.0, "right": 0.1}, worst=(worst, 1.0)
+            slips_hopelessly=slips,
+            barely_rolls=slips,
+            slips={"left": 1.0, "right": 0.1},
+            worst=Worst(worst, 1.0, None),
+            share=1.0,
         )
         self.record.add_runs([{"stage": "refine", "what": len(self.tried)}])
         certificate = {str(i): {"holds": i >= missed} for i in range(9)}
@@ -162,7 +168,7 @@ def test_what_a_firmer_grip_changes_is_told_from_the_hand_before_any_refinement(
 
     told: Any = {}
     monkeypatch.setattr(certify, "design_change", lambda _, before, after: {"from": before, "to": after})
-    record, stage = Record(ball_task(), None, lambda _: None), SimpleNamespace(solve=solve)
-    Refiner(record, told, told, 1)._attempt(stage, whole, FIRM, near=True, start=exact)  # type: ignore[arg-type]
+    record = Record(ball_task(), None, lambda _: None)
+    Refiner(record, told, told, 1)._attempt(whole, FIRM, partial(solve, exact, near=True))  # type: ignore[arg-type]
     assert asked == [(exact, FIRM, True)]
     assert record.design.stages[-1]["design_change"] == {"from": whole, "to": firm}

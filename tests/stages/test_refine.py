@@ -11,7 +11,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.design import Design
-from casadi_hands.stages import refine
+from casadi_hands.stages import continuation
+from casadi_hands.stages.continuation import Continuation
 from casadi_hands.stages.floating import FloatingStage
 from casadi_hands.stages.model import Model, build_model
 from casadi_hands.stages.outcome import design_change, hand_of, joint_loads, whole_hand_motion
@@ -22,7 +23,7 @@ from casadi_hands.stages.refine import (
     HOPELESS,
     WEIGHTS,
     Refined,
-    RefineStage,
+    Worst,
 )
 from casadi_hands.stages.refine_values import TOOL_TOLERANCE, Margin, longest_run
 from casadi_hands.stages.whole_hand import WholeHand
@@ -163,7 +164,7 @@ def test_a_result_has_every_contact_in_its_own_place(made_up: MadeUp) -> None:
     assert not hand.active[:, 1].any()
     np.testing.assert_array_equal(np.hstack([hand.position, hand.vector]), values["pose"])
     assert refined.exact
-    assert refined.worst == ("a", ACCEPTED)
+    assert refined.worst == Worst("a", ACCEPTED, None)
 
 
 @pytest.mark.parametrize("violation", [1.01 * ACCEPTED, np.inf])
@@ -171,7 +172,32 @@ def test_a_motion_that_violates_is_not_exact(made_up: MadeUp, violation: float) 
     solution = replace(made_up_solution(made_up.values), excess={"a": np.zeros(1), "b": np.array([0.0, violation])})
     refined = made_up.stage._result(made_up.start, [("exact", solution)], {}, WEIGHTS)
     assert not refined.exact
-    assert refined.worst == ("b", violation)
+    assert refined.worst == Worst("b", violation, None)
+
+
+@pytest.mark.parametrize(
+    ("constraint", "instance", "sample"),
+    [
+        # The second finger in use is lifted in samples 4 to 6; its point is on both bodies until the first of these.
+        ("contact2.on_link", 5, 7),
+        ("rolling2.no_slip", 4, 7),
+        ("apart2.clear", 1, 6),
+        ("contact0.cone", 5, 5),
+        ("held2.cone", 1, 7),
+        ("pushed.sum", 0, 3),
+        ("physics.defect", 14, 14),
+    ],
+)
+def test_the_time_of_the_worst_violation_is_that_of_its_knot(
+    made_up: MadeUp, constraint: str, instance: int, sample: int
+) -> None:
+    rows = made_up.stage.problem.constraint_rows[constraint]
+    excess = np.zeros(rows.shape)
+    excess[instance, -1] = 2.0
+    solution = replace(made_up_solution(made_up.values), excess={constraint: excess, "other.one": np.ones(3)})
+    worst = made_up.stage._worst(solution)
+    assert (worst.constraint, worst.violation) == (constraint, 2.0)
+    assert worst.time == pytest.approx(made_up.model.schedule.samples[sample])
 
 
 def test_a_start_that_is_no_number_is_never_accepted(drawn: MadeUp) -> None:
@@ -205,7 +231,7 @@ def solved(tmp_path_factory: pytest.TempPathFactory) -> Solved:
     model = build_model(task)
     floating = FloatingStage(model).solve(dict(task.weights.floating))
     whole = whole_hand_of_two_joints(task, model, floating, trials=3)
-    refined = RefineStage(model, whole.contacts, (2,) * model.contacts, whole.active).solve(whole)
+    refined = Continuation(model, whole.contacts, (2,) * model.contacts, whole.active).solve(whole)
     result = refined.hand
     torque, speed = joint_loads(model, result)
     built = hand_of(task, model, result.fingers, result.contacts, torque, speed)
@@ -217,12 +243,12 @@ def solved(tmp_path_factory: pytest.TempPathFactory) -> Solved:
 
 def test_the_result_is_exact_and_the_audit_certifies_it(solved: Solved) -> None:
     assert solved.refined.exact
-    assert solved.refined.worst[1] <= ACCEPTED
+    assert solved.refined.worst.violation <= ACCEPTED
     assert not solved.refined.slips_hopelessly
     assert not solved.refined.barely_rolls
     assert solved.verdict.reasons == []
     assert solved.verdict.certified
-    assert [what for what, _ in solved.refined.runs] == ["soft", "firm", "exact"]
+    assert [what for what, _ in solved.refined.runs] == ["coarse soft", "coarse firm", "coarse exact", "exact"]
 
 
 def test_the_files_have_the_points_and_forces_that_balance(solved: Solved) -> None:
@@ -275,7 +301,7 @@ def test_what_moved_is_told(solved: Solved) -> None:
 def test_the_slip_left_by_the_firm_solve_is_told(solved: Solved) -> None:
     assert set(solved.refined.slips) == set(solved.task.fingers)
     assert 0 < max(solved.refined.slips.values()) < HOPELESS
-    firm = dict(solved.refined.runs)["firm"].constraints
+    firm = dict(solved.refined.runs)["coarse firm"].constraints
     for contact, name in enumerate(solved.model.contact_names):
         steps = np.linalg.norm(firm[f"rolling{contact}.no_slip"], axis=1)
         assert solved.refined.slips[name] == pytest.approx(steps.sum(), rel=1e-12)
@@ -295,18 +321,19 @@ def test_one_joint_cannot_roll_with_the_object_and_no_exact_solve_is_tried(solve
         for finger in whole.fingers
     )
     start = replace(whole, fingers=fingers, angles=tuple(angles[:, :1] for angles in whole.angles))
-    refined = RefineStage(model, whole.contacts, (1, 1, 1), whole.active).solve(start)
+    refined = Continuation(model, whole.contacts, (1, 1, 1), whole.active).solve(start)
     assert refined.slips_hopelessly
     assert refined.barely_rolls
     assert not refined.exact
     assert max(refined.slips.values()) > HOPELESS
-    assert [what for what, _ in refined.runs] == ["soft", "firm"]
+    assert [what for what, _ in refined.runs] == ["coarse soft", "coarse firm"]
+    assert len(refined.hand.position) == len(model.schedule.samples)
     assert refined.weights == WEIGHTS | FIRM
 
 
 def test_an_exact_motion_stays_itself_by_the_short_way(solved: Solved) -> None:
     model, before = solved.model, solved.refined.hand
-    again = RefineStage(model, before.contacts, (2,) * model.contacts, before.active).solve(before, near=True)
+    again = Continuation(model, before.contacts, (2,) * model.contacts, before.active).solve(before, near=True)
     assert again.exact
     assert [what for what, _ in again.runs] == ["exact"]
     assert again.runs[0][1].iterations < sum(solution.iterations for _, solution in solved.refined.runs) / 2
@@ -324,13 +351,15 @@ def test_an_exact_motion_stays_itself_by_the_short_way(solved: Solved) -> None:
 def test_where_the_short_way_leads_nowhere_the_long_one_is_taken(
     solved: Solved, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    last, weights, options = refine.SHORT_WAY[-1]
-    monkeypatch.setattr(refine, "SHORT_WAY", (refine.SHORT_WAY[0], (last, weights, replace(options, max_iter=1))))
+    last, weights, options = continuation.SHORT_WAY[-1]
+    vain = continuation.SHORT_WAY[0], (last, weights, replace(options, max_iter=1))
+    monkeypatch.setattr(continuation, "SHORT_WAY", vain)
     model, before = solved.model, solved.refined.hand
     # The second goal a little farther to the side.
     farther = replace(
         model, goal_positions=np.add(model.goal_positions, [[0, 0, 0], [0, 0.05, 0], [0, 0, 0], [0, 0, 0]])
     )
-    again = RefineStage(farther, before.contacts, (2,) * model.contacts, before.active).solve(before, near=True)
+    again = Continuation(farther, before.contacts, (2,) * model.contacts, before.active).solve(before, near=True)
     assert again.exact
-    assert [what for what, _ in again.runs][-5:] == ["firm", "exact", "soft", "firm", "exact"]
+    names = [what for what, _ in again.runs]
+    assert names[-6:] == ["coarse firm", "coarse exact", "coarse soft", "coarse firm", "coarse exact", "exact"]

@@ -1,0 +1,128 @@
+"""Which ways to an exact motion are taken, and where they end, with solves that are told whether they serve."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from casadi_hands.stages.continuation import SHORTEST, Continuation
+from casadi_hands.stages.refine import LONG_WAY, SHORT_WAY, Refined, Worst
+from casadi_hands.stages.refine_values import Margin
+from casadi_hands.stages.sampling import resampled_model
+from casadi_hands.stages.whole_hand import WholeHand
+from tests.stages.example import everything, made_up_solution
+from tests.stages.refining import carrying
+
+_, MODEL = everything()
+FEWER = resampled_model(MODEL, 0.2)
+
+
+@pytest.fixture(scope="module")
+def start() -> WholeHand:
+    return carrying().start
+
+
+class Told(Continuation):
+    """Solves return the motion they begin with, moved by their number, exact where they are told to be.
+
+    Attributes:
+        taken: for each solve whether it was on coarse knots, the last step of its way, the share, and where the object
+            was in the middle of what it began with.
+    """
+
+    def __init__(self, exact: Callable[[bool, float], bool]) -> None:
+        super().__init__(MODEL, (0, 2), (1, 2), np.ones((len(MODEL.schedule.samples), MODEL.contacts + 1), bool))
+        self.taken: list[tuple[bool, str, float, float]] = []
+        self.exact_where = exact
+
+    def _stage(self, model: Any, coarse: bool) -> Any:
+        def take(way: Any, hand: WholeHand, margin: Margin, share: float = 1.0) -> Refined:
+            assert len(hand.position) == len(model.schedule.samples)
+            self.taken.append((coarse, " ".join(step[0] for step in way), share, float(hand.position[-1, 0])))
+            runs = tuple((step[0], made_up_solution({})) for step in way)
+            moved = SimpleNamespace(**vars(hand))
+            moved.position = hand.position[:1] + share * np.linspace(0, 1, len(hand.position))[:, None]
+            result = WholeHand(**vars(moved))
+            exact = self.exact_where(coarse, share)
+            return Refined(result, exact, Worst("a.b", 0.0, None), {"left": share}, runs, {}, share)
+
+        return SimpleNamespace(model=model, take=take, costs=lambda *_: {"slip": 1.0, "passive_force": 0.0})
+
+    @property
+    def fine(self) -> Any:  # type: ignore[override]
+        self._fine = getattr(self, "_fine", None) or self._stage(MODEL, coarse=False)
+        return self._fine
+
+    @property
+    def coarse(self) -> Any:  # type: ignore[override]
+        self._coarse = getattr(self, "_coarse", None) or self._stage(FEWER, coarse=True)
+        return self._coarse
+
+
+def names(way: Any) -> str:
+    return " ".join(step[0] for step in way)
+
+
+def test_a_motion_is_made_exact_on_coarse_knots_first(start: WholeHand) -> None:
+    told = Told(lambda coarse, share: True)
+    refined = told.solve(start)
+    assert [(coarse, way) for coarse, way, *_ in told.taken] == [(True, names(LONG_WAY)), (False, "exact")]
+    assert refined.exact
+    assert [what for what, _ in refined.runs] == [*(f"coarse {step[0]}" for step in LONG_WAY), "exact"]
+    assert len(refined.hand.position) == len(MODEL.schedule.samples)
+    # The palm goes as it did, not as coarse samples of it.
+    np.testing.assert_array_equal(refined.hand.palm_position, start.palm_position)
+
+
+def test_what_fails_on_coarse_knots_is_not_tried_on_dense_ones(start: WholeHand) -> None:
+    told = Told(lambda coarse, share: False)
+    refined = told.solve(start)
+    assert [coarse for coarse, *_ in told.taken] == [True]
+    assert not refined.exact
+    assert len(refined.hand.position) == len(MODEL.schedule.samples)
+    np.testing.assert_array_equal(refined.hand.active, start.active)
+
+
+def test_near_motions_take_the_short_way_and_the_long_one_where_it_fails(start: WholeHand) -> None:
+    told = Told(lambda coarse, share: coarse)
+    refined = told.solve(start, near=True)
+    on_fine = [(False, "exact"), (False, names(SHORT_WAY))]
+    ways = [(True, names(SHORT_WAY)), *on_fine, (True, names(LONG_WAY)), *on_fine]
+    assert [(coarse, way) for coarse, way, *_ in told.taken] == ways
+    assert not refined.exact
+    assert len(refined.runs) == sum(len(way.split()) for _, way in ways)
+
+
+def test_a_motion_is_lengthened_until_it_reaches_its_goals(start: WholeHand) -> None:
+    told = Told(lambda coarse, share: True)
+    refined = told.lengthen(start, 0.5)
+    assert [share for *_, share, _ in told.taken] == [0.5, 0.75, 1.0, 1.0]
+    assert [way for _, way, *_ in told.taken] == [names(LONG_WAY), names(SHORT_WAY), names(SHORT_WAY), "exact"]
+    # Each begins where the ones before lead: the object went as far as its share.
+    begun = [place - told.taken[1][3] for *_, place in told.taken[1:3]]
+    assert begun[1] == pytest.approx(0.25)
+    assert refined.exact
+    assert refined.share == 1
+    assert refined.runs[0][0] == "50% of the way, soft"
+
+
+def test_steps_get_shorter_where_they_fail_and_the_longest_exact_motion_is_kept(start: WholeHand) -> None:
+    told = Told(lambda coarse, share: share < 0.8)
+    refined = told.lengthen(start, 0.5)
+    shares = [share for coarse, _, share, _ in told.taken if coarse]
+    assert shares == [0.5, 0.75, 1.0, 0.875, 0.8125]
+    assert refined.share == 0.75
+    assert not refined.exact
+    assert told.taken[-1][:3] == (False, "exact", 0.75)
+    assert SHORTEST > (1 - 0.5) / 2 / 2**3
+
+
+def test_a_motion_that_fails_from_the_first_is_not_lengthened(start: WholeHand) -> None:
+    told = Told(lambda coarse, share: False)
+    refined = told.lengthen(start, 0.5)
+    assert len(told.taken) == 1
+    assert (refined.exact, refined.share) == (False, 0.5)

@@ -1,0 +1,105 @@
+"""Motions at other samples and over a part of their way, against closed forms."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from casadi_hands.motion import Schedule
+from casadi_hands.stages.sampling import at_rest, extrapolated, resampled, resampled_model, shortened
+from casadi_hands.stages.whole_hand import WholeHand
+from tests.stages.example import everything
+from tests.stages.refining import carrying
+
+Array = np.ndarray
+
+
+@pytest.fixture(scope="module")
+def start() -> WholeHand:
+    return carrying().start
+
+
+def smooth(times: Array, columns: int) -> Array:
+    """A motion that rests at both ends."""
+    phase = np.pi * times / times[-1]
+    return np.outer(1 - np.cos(phase), np.arange(1, columns + 1))
+
+
+def test_keyframes_stay_and_samples_are_at_most_a_step_apart() -> None:
+    schedule = Schedule.of([0.0, 0.6, 1.5], 1.5, 2, 0.1)
+    fewer = schedule.stepped(0.2)
+    np.testing.assert_array_equal(fewer.keyframes, schedule.keyframes)
+    np.testing.assert_allclose(fewer.samples, [0, 0.2, 0.4, 0.6, 0.75, 0.9, 1.05, 1.2, 1.35, 1.5])
+    np.testing.assert_allclose(fewer.samples[fewer.keyframe_samples], fewer.keyframes)
+    assert (fewer.goals, fewer.step) == (schedule.goals, 0.2)
+
+
+def test_a_task_at_fewer_samples_has_the_same_palm_and_pushes_there() -> None:
+    _, model = everything()
+    fewer = resampled_model(model, 0.2)
+    assert len(fewer.schedule.samples) < len(model.schedule.samples)
+    for k, time in enumerate(fewer.schedule.samples):
+        at = int(np.argmin(np.abs(model.schedule.samples - time)))
+        if abs(model.schedule.samples[at] - time) < 1e-9:
+            np.testing.assert_allclose(fewer.palm_position[k], model.palm_position[at], atol=1e-12)
+            np.testing.assert_allclose(fewer.palm_quaternion[k], model.palm_quaternion[at], atol=1e-12)
+            np.testing.assert_array_equal(fewer.perturbation_force[k], model.perturbation_force[at])
+    assert fewer.perturbation_force.any()
+    np.testing.assert_allclose(np.linalg.norm(fewer.palm_quaternion, axis=1), 1, atol=1e-12)
+
+
+def test_a_smooth_motion_comes_back_from_fewer_samples(start: WholeHand) -> None:
+    _, model = everything()
+    fewer = resampled_model(model, 0.2)
+    times = model.schedule.samples
+    contacts = start.point.shape[1]
+    moving = replace(
+        start,
+        position=smooth(times, 3),
+        vector=0.5 * smooth(times, 3),
+        angles=tuple(smooth(times, a.shape[1]) for a in start.angles),
+        point=smooth(times, 3 * contacts).reshape(-1, contacts, 3),
+        force=np.outer(times, np.ones(3 * contacts)).reshape(-1, contacts, 3),
+    )
+    there = resampled(moving, model, fewer)
+    np.testing.assert_allclose(there.position, smooth(fewer.schedule.samples, 3), atol=2e-3)
+    np.testing.assert_allclose(there.force[:, 0, 0], fewer.schedule.samples, atol=1e-12)
+    back = resampled(there, fewer, model)
+    for name in ("position", "vector", "point", "force"):
+        scale = np.abs(getattr(moving, name)).max()
+        np.testing.assert_allclose(getattr(back, name), getattr(moving, name), atol=0.01 * scale)
+    for given, found in zip(moving.angles, back.angles, strict=True):
+        np.testing.assert_allclose(found, given, atol=0.05)
+
+
+def test_a_contact_touches_at_a_sample_as_from_the_last_before_it(start: WholeHand) -> None:
+    _, model = everything()
+    fewer = resampled_model(model, 0.2)
+    there = resampled(start, model, fewer)
+    for k, time in enumerate(fewer.schedule.samples):
+        last = int(np.flatnonzero(model.schedule.samples <= time + 1e-9)[-1])
+        np.testing.assert_array_equal(there.active[k], start.active[last])
+    assert not there.active.all()
+
+
+def test_goals_of_a_part_of_the_way_are_on_it() -> None:
+    _, model = everything()
+    half = shortened(model, 0.5)
+    first, last = model.goal_positions[0], model.goal_positions[-1]
+    np.testing.assert_allclose(half.goal_positions[0], first)
+    np.testing.assert_allclose(half.goal_positions[-1], (first + last) / 2)
+    np.testing.assert_allclose(2 * half.goal_vectors, model.goal_vectors + model.goal_vectors[0])
+    np.testing.assert_array_equal(shortened(model, 1.0).goal_positions, model.goal_positions)
+
+
+def test_motions_go_on_as_they_have_grown(start: WholeHand) -> None:
+    still = at_rest(start)
+    np.testing.assert_array_equal(still.position, np.tile(start.position[0], (len(start.position), 1)))
+    # From rest to a motion, and half as far again.
+    farther = extrapolated(still, start, 0.5)
+    np.testing.assert_allclose(farther.position, start.position + 0.5 * (start.position - start.position[0]))
+    np.testing.assert_allclose(farther.angles[1], start.angles[1] + 0.5 * (start.angles[1] - start.angles[1][0]))
+    np.testing.assert_allclose(farther.point[3], 1.5 * start.point[3] - 0.5 * start.point[0])
+    np.testing.assert_array_equal(farther.force, start.force)
