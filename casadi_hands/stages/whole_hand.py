@@ -29,8 +29,8 @@ from casadi_hands.stages.synthesis import MARGIN, FingerSeed
 from casadi_hands.stages.target import string_of
 
 Array = NDArray[np.float64]
-# An adaptive barrier took a fifth of the iterations of a monotone one where the start is far from the contacts.
-OPTIONS = Options(max_iter=200, tol=1e-4, acceptable_tol=1e-3, extra=(("mu_strategy", "adaptive"),))
+# The start is near what is wanted: a small barrier, and no push away from bounds, take half of a large one's iterations.
+OPTIONS = Options(mu_init=1e-3, extra=(("bound_push", 1e-4), ("bound_frac", 1e-4)))
 FARTHEST_PALM = 2.0  # half extents and rad, how far a palm that may move leaves its given motion
 
 
