@@ -17,7 +17,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
 import numpy as np
 from isolated import isolated, largest_memory
@@ -25,10 +24,11 @@ from shared import NOTHING, options_of, write_table
 
 from casadi_hands.nlp import Options, Solution, Solver
 from casadi_hands.search.seeds import random_finger
-from casadi_hands.stages import refine
 from casadi_hands.stages.floating import Floating, FloatingStage
 from casadi_hands.stages.model import Model, build_model
 from casadi_hands.stages.object_side import object_parameters, sizes, term_weights
+from casadi_hands.stages.refine import LONG_WAY, RefineStage
+from casadi_hands.stages.refine_values import Margin
 from casadi_hands.stages.synthesis import OPTIONS, FingerSeed, SynthesisStage
 from casadi_hands.stages.target import Target, target_of
 from casadi_hands.stages.whole_hand import OPTIONS as WHOLE
@@ -237,13 +237,12 @@ def _refine(task: Task, model: Model, size: Size) -> Measured:
     whole = WholeHandStage(model, contacts, joints, False)
     start = whole.solve(floating, tuple(alone), dict(task.weights.whole_hand), replace(WHOLE, max_iter=40))
 
-    short = tuple((what, weight, replace(how, max_iter=ITERATIONS)) for what, weight, how in refine.LONG_WAY)
+    way = tuple((what, weight, replace(how, max_iter=ITERATIONS)) for what, weight, how in LONG_WAY)
 
-    def iterate(stage: refine.RefineStage) -> list[Solution]:
-        with patch.object(refine, "LONG_WAY", short):
-            return [solution for _, solution in stage.solve(start).runs]
+    def iterate(stage: RefineStage) -> list[Solution]:
+        return [solution for _, solution in stage.take(way, start, Margin()).runs]
 
-    return lambda: refine.RefineStage(model, contacts, joints, start.active), iterate
+    return lambda: RefineStage(model, contacts, joints, start.active), iterate
 
 
 _STAGES: dict[str, Callable[[Task, Model, Size], Measured]] = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -54,8 +55,7 @@ def warm_start(earlier: Design, task: Task, model: Model) -> WholeHand:
     _check_structure(earlier, earlier.hand, task)
     old, motion = build_model(earlier.task), earlier.motion
     was = _retold(earlier.hand, motion, old, model)
-    columns = [motion.contact_names.index(name) for name in model.contact_names]
-    on_link = motion.contact_point_link[:, columns] / model.units.length
+    on_link = _in_columns(motion, model, motion.contact_point_link) / model.units.length
     on_link = np.tensordot(linear(motion.time, _stretched(old, model)), on_link, axes=1)
     return _followed(was, _moved(was, task, old, model), on_link, old, model)
 
@@ -121,12 +121,10 @@ def _refused(why: str, earlier: Design) -> str:
 def _retold(hand: Hand, motion: Motion, old: Model, model: Model) -> WholeHand:
     """The earlier motion as it was, at the samples and in the units of the new task; still of the old reference."""
     when, length = _stretched(old, model), model.units.length
-    names = motion.contact_names
-    columns = [names.index(name) for name in (*model.contact_names, *(["ground"] if model.ground else []))]
     between = linear(motion.time, when)
     turns = np.array([_matrix(q) for q in motion.object_orientation])
-    forces = np.einsum("sji,scj->sci", turns, motion.contact_force[:, columns]) / old.units.force
-    active = motion.contact_active[held(motion.time, when)][:, columns]
+    forces = np.einsum("sji,scj->sci", turns, _in_columns(motion, model, motion.contact_force)) / old.units.force
+    active = _in_columns(motion, model, motion.contact_active)[held(motion.time, when)]
     contacts = [model.contact_names.index(finger.name) for finger in hand.fingers]
     joints, at = _spline(motion.time, motion.joint_angles)(when), model.schedule.keyframe_samples
     fingers, angles = [], []
@@ -147,11 +145,21 @@ def _retold(hand: Hand, motion: Motion, old: Model, model: Model) -> WholeHand:
         palm_quaternion=np.array([quaternion(r) for r in _turns(motion.time, motion.base_orientation, when)]),
         position=path[0],
         vector=path[1],
-        point=np.tensordot(between, motion.contact_point_object[:, columns] / length, axes=1),
+        point=np.tensordot(between, _in_columns(motion, model, motion.contact_point_object) / length, axes=1),
         force=np.tensordot(between, forces, axes=1) * active[:, :, None],
         active=active,
         solution=_NOT_SOLVED,
     )
+
+
+def _in_columns(motion: Motion, model: Model, values: NDArray[Any]) -> NDArray[Any]:
+    """Values (S, C, …) of a motion's contacts in the order of the model's; zero for one that never acts."""
+    names = (*model.contact_names, *(["ground"] if model.ground else []))
+    result = np.zeros((len(values), len(names), *values.shape[2:]), values.dtype)
+    for c, name in enumerate(names):
+        if name in motion.contact_names:
+            result[:, c] = values[:, motion.contact_names.index(name)]
+    return result
 
 
 def _seed(finger: Finger, angles: Array, length: float) -> FingerSeed:

@@ -26,7 +26,7 @@ WITHOUT_FORCE = frozenset(
         "disturbance_radius",
     )
 )
-WITHOUT_CONTACT = WITHOUT_FORCE | {"gap", "penetration"}
+WITHOUT_CONTACT = WITHOUT_FORCE | {"gap", "penetration", "joint_limit"}
 
 
 def beyond_reach(target: Target, contact: int, joints: int) -> Array:

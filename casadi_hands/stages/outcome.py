@@ -92,7 +92,10 @@ def floating_motion(model: Model, floating: Floating) -> Motion:
 
 
 def whole_hand_motion(model: Model, result: WholeHand) -> Motion:
-    """The motion of stage 3; each contact's point on the link is the point of its surface nearest the object's."""
+    """The motion of stage 3; each contact's point on the link is the point of its surface nearest the object's.
+
+    A contact without a finger, since it never acts, is left out.
+    """
     count = len(result.force)
     names = model.contact_names + (("ground",) if model.ground is not None else ())
     capsules = model.capsules if model.ground is None else np.vstack([model.capsules, model.ground.capsule])
@@ -117,9 +120,10 @@ def whole_hand_motion(model: Model, result: WholeHand) -> Motion:
     angles = np.hstack(result.angles) if result.angles else np.zeros((count, 0))
     joint_names = tuple(f"finger{i}_joint{j}" for i, f in enumerate(result.fingers) for j in range(f.joints))
     object_pose, palm = (result.position, result.vector), (result.palm_position, result.palm_quaternion)
-    return _motion(
-        model, *object_pose, *palm, angles, joint_names, names, links, result.active, result.force, point, on_link
-    )
+    touch = [c for c, link in enumerate(links) if link != "none"]
+    contacts = tuple(names[c] for c in touch), [links[c] for c in touch]
+    active, force, point, on_link = result.active[:, touch], result.force[:, touch], point[:, touch], on_link[:, touch]
+    return _motion(model, *object_pose, *palm, angles, joint_names, *contacts, active, force, point, on_link)
 
 
 def _rotation(model: Model, vector: Array) -> Array:

@@ -42,7 +42,7 @@ WEIGHTS = {
     "joint_jerk": 3e-3,
     "object_acceleration": 1e-2,
     "object_jerk": 1e-3,
-    "stay_design": 0.02,
+    "stay_design": 5.0,  # or fingers grow long and turn elsewhere for next to nothing
     "stay_path": 1.0,
     "goal": 300.0,
     "force_regularisation": 1e-3,
@@ -50,7 +50,6 @@ WEIGHTS = {
 FIRM = {"slip": 100.0, "passive_force": 30.0}
 FIRMER = FIRM | {"slip": 1000.0}
 EXACT = {"slip": 100.0}  # its tolerance is there for where it is needed
-STAY = {"stay_design": 2.0}  # a hand that serves nearly
 Step = tuple[str, dict[str, float], Options]
 LONG_WAY: tuple[Step, ...] = (
     ("soft", WEIGHTS, SOFT),
@@ -59,7 +58,7 @@ LONG_WAY: tuple[Step, ...] = (
     ("exact", WEIGHTS | EXACT, HARD),
 )
 # From an exact motion to one nearby; the first step can be left out where joints can follow and supply their forces.
-SHORT_WAY: tuple[Step, ...] = (("firm", WEIGHTS | FIRM | STAY, FIRM_SOLVE), ("exact", WEIGHTS | EXACT | STAY, HARD))
+SHORT_WAY: tuple[Step, ...] = (LONG_WAY[1], LONG_WAY[-1])
 
 
 @dataclass(frozen=True)

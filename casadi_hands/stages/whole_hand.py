@@ -29,7 +29,7 @@ from casadi_hands.stages.synthesis import MARGIN, FingerSeed
 from casadi_hands.stages.target import string_of
 
 Array = NDArray[np.float64]
-# The start is near what is wanted: a small barrier, and no push away from bounds, take half of a large one's iterations.
+# The start is near what is wanted: a small barrier, and no push away from bounds, halve the iterations of a large one.
 OPTIONS = Options(mu_init=1e-3, extra=(("bound_push", 1e-4), ("bound_frac", 1e-4)))
 FARTHEST_PALM = 2.0  # half extents and rad, how far a palm that may move leaves its given motion
 

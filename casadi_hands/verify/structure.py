@@ -54,17 +54,17 @@ def _motion_problems(folder: Folder) -> list[str]:
 
 
 def _contact_problems(folder: Folder) -> list[str]:
-    motion, fingers, problems = folder.motion, list(folder.task.fingers), []
+    motion, problems = folder.motion, []
+    # A finger of the task whose contact never acts is not built.
+    fingers = [name for name in folder.task.fingers if name in motion.contact_names]
     for name, link in zip(motion.contact_names, motion.contact_link, strict=True):
         if link == "ground":
             continue
         if name not in fingers:
-            problems.append(f"contact '{name}': the task has no finger of that name, only {', '.join(fingers)}")
+            known = ", ".join(folder.task.fingers)
+            problems.append(f"contact '{name}': the task has no finger of that name, only {known}")
         elif link.partition("_link")[0] != f"finger{fingers.index(name)}":
             problems.append(f"contact '{name}' is on {folder.call(link)}, not on its own finger")
-    missing = [name for name in fingers if name not in motion.contact_names]
-    if missing:
-        problems.append(f"contact_names: no contact for finger {', '.join(missing)}")
     idle = np.linalg.norm(motion.contact_force, axis=2) * ~motion.contact_active
     if idle.max(initial=0.0) > 1e-9 * folder.weight:
         k, c = np.unravel_index(np.argmax(idle), idle.shape)
