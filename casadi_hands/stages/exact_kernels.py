@@ -12,7 +12,7 @@ from casadi_hands.nlp import Kernel
 from casadi_hands.stages.finger_symbols import FingerSymbols, PlacedFinger, morphology
 from casadi_hands.stages.hand_kernels import distances
 from casadi_hands.stages.kernels import placed
-from casadi_hands.stages.surface import from_axis, smooth_surface, tangents
+from casadi_hands.stages.surface import from_axis, path_between, smooth_surface, tangents
 from casadi_hands.terms import clearance, finger
 
 LEVER = 0.06  # half extents/rad: forces that need a shorter lever than about this count as not supplied
@@ -33,6 +33,7 @@ class Touch:
         off_link: (3,) how far the link's axis is from a link's radius above the object's surface, object frame: zero
             where surfaces touch with opposed normals, and linear in where the link is, so that none ends up inside.
         normal: (3,) outward from the object, object frame.
+        link_normal: (3,) outward from the link, link frame.
         rotation: (3, 3) object axes to palm axes.
         placed: the finger with the contact as its point.
     """
@@ -41,6 +42,7 @@ class Touch:
     off_object: SX
     off_link: SX
     normal: SX
+    link_normal: SX
     rotation: SX
     placed: PlacedFinger
 
@@ -71,11 +73,12 @@ class Scene:
         on_link = ca.mtimes(skeleton.tip_rotation.T, in_palm - skeleton.origins[:, -1])
         off_object, normal = smooth_surface(point, self.capsule[:3], self.capsule[3:6], self.capsule[6])
         end = ca.vertcat(0, 0, symbols.lengths[-1])
-        from_link = ca.mtimes(rotation.T, ca.mtimes(skeleton.tip_rotation, from_axis(on_link, SX.zeros(3, 1), end)))
+        from_end = from_axis(on_link, SX.zeros(3, 1), end)
+        from_link = ca.mtimes(rotation.T, ca.mtimes(skeleton.tip_rotation, from_end))
         from_object = from_axis(point, self.capsule[:3], self.capsule[3:6])
         off_link = from_link + self.radius / self.capsule[6] * from_object
         here = symbols.placed(angles, on_link)
-        return Touch(on_link, off_object, off_link, normal, rotation, here)
+        return Touch(on_link, off_object, off_link, normal, from_end / self.radius, rotation, here)
 
 
 def contact(joints: int, index: int, limited: bool) -> Kernel:
@@ -133,11 +136,7 @@ def _hold(kernel: Kernel, touch: Touch, force: SX, friction: SX, limited: bool) 
 
 
 def rolling(joints: int, index: int) -> Kernel:
-    """One contact from one knot to the next: its paths over both surfaces agree (no slip), and its spin costs.
-
-    With the contact on both surfaces at both knots, no slip is to second order in the step
-    (R_k + R_k+1) Δr = (F_k + F_k+1) Δp, r over the object and p over the link.
-    """
+    """One contact from one knot to the next: its paths over both surfaces agree (no slip), and its spin costs."""
     kernel = Kernel(f"rolling{index}")
     symbols = free_morphology(kernel, joints)
     poses, points, angles = [], [], []
@@ -148,9 +147,9 @@ def rolling(joints: int, index: int) -> Kernel:
     scenes = [Scene.declare(kernel, str(i)) for i in range(2)]
     helper, step = kernel.parameter("helper", 3), kernel.parameter("step")
     before, after = (scenes[i].touch(poses[i], points[i], angles[i], symbols) for i in range(2))
-    over_object = ca.mtimes(before.rotation + after.rotation, points[1] - points[0]) / 2
-    turn = before.placed.tip_rotation + after.placed.tip_rotation
-    over_link = ca.mtimes(turn, after.on_link - before.on_link) / 2
+    turns = before.placed.tip_rotation, after.placed.tip_rotation
+    over_object = path_between(points, (before.normal, after.normal), (before.rotation, after.rotation))
+    over_link = path_between((before.on_link, after.on_link), (before.link_normal, after.link_normal), turns)
     first, second = (ca.mtimes(before.rotation, t) for t in tangents(before.normal, helper))
     slip = ca.vertcat(ca.dot(first, over_object - over_link), ca.dot(second, over_object - over_link))
     kernel.constrain("no_slip", slip)

@@ -10,7 +10,7 @@ from casadi_hands.geometry import point_disc_distance
 from casadi_hands.motion import conjugate, multiply, rotation_matrix
 from casadi_hands.nlp import Kernel
 from casadi_hands.stages.kernels import placed
-from casadi_hands.stages.surface import smooth_surface
+from casadi_hands.stages.surface import path_between, smooth_surface
 
 # Gauss and Legendre's points and weights, for a step from 0 to 1.
 _GAUSS, _GAUSS_WEIGHTS = (leggauss(3)[0] + 1) / 2, leggauss(3)[1] / 2
@@ -213,15 +213,19 @@ def ground_rolling() -> Kernel:
     """The object's contact with the ground from one knot to the next: it rolls or stands, and does not slip."""
     kernel = Kernel("ground_rolling")
     ends = [(kernel.variable(f"pose{i}", 6), kernel.variable(f"point{i}", 3)) for i in range(2)]
-    reference, step = kernel.parameter("reference", 4), kernel.parameter("step")
-    seen = []
+    reference, capsule, step = (
+        kernel.parameter("reference", 4),
+        kernel.parameter("capsule", 7),
+        kernel.parameter("step"),
+    )
+    points, normals, rotations, world = [], [], [], []
     for pose, point in ends:
         position, quaternion = placed(pose, reference)
-        rotation = rotation_matrix(quaternion)
-        seen.append((rotation, point, position + ca.mtimes(rotation, point)))
-    (rotation0, point0, world0), (rotation1, point1, world1) = seen
-    over_object = ca.mtimes(rotation0 + rotation1, point1 - point0) / 2
-    slip = (over_object - world1 + world0)[:2]
+        points.append(point)
+        normals.append(smooth_surface(point, capsule[:3], capsule[3:6], capsule[6])[1])
+        rotations.append(rotation_matrix(quaternion))
+        world.append(position + ca.mtimes(rotations[-1], point))
+    slip = (path_between(points, normals, rotations) - world[1] + world[0])[:2]
     kernel.constrain("no_slip", slip)
     kernel.cost("slip", slip / step)
     return kernel

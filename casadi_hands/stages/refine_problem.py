@@ -218,7 +218,13 @@ class RefineProblem:
         self._bind(touching, body.ground_contact(), rows, self._at(names, touching), surfaces | _HELD)
         start = np.flatnonzero(structure.active[:-1, column])
         rows = [r.take(k) for k in (start, start + 1) for r in (self.pose, self.point.entries(*span))]
-        self._bind(start, body.ground_rolling(), rows, self._at(("reference", "step"), start), {"no_slip": _FREE})
+        self._bind(
+            start,
+            body.ground_rolling(),
+            rows,
+            self._at(("reference", f"capsule{c}", "step"), start),
+            {"no_slip": _FREE},
+        )
         pushed = np.flatnonzero(structure.active[self.pushed, column])
         if len(pushed):
             knots = self.pushed[pushed]

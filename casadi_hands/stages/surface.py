@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import casadi as ca
 from casadi import SX
 
@@ -23,6 +25,28 @@ def smooth_surface(point: SX, start: SX, end: SX, radius: SX) -> tuple[SX, SX]:
     offset = from_axis(point, start, end)
     distance = norm(offset, 1e-6)
     return distance - radius, offset / distance
+
+
+def path_between(points: Sequence[SX], normals: Sequence[SX], rotations: Sequence[SX]) -> SX:
+    """The way (3,) of a contact over a body's surface from one knot to the next, seen from outside halfway between.
+
+    The chord between the points, stretched to the arc where the surface bends (where it does, normals differ along the
+    chord), and turned as the body is halfway: what rolls evenly over circles or lines goes the same way on both bodies,
+    up to the fifth order in the turns.
+
+    Args:
+        points: (3,) each, on the surface, body frame.
+        normals: (3,) each, unit, body frame.
+        rotations: (3, 3) each, of the body.
+    """
+    chord, bend = points[1] - points[0], normals[1] - normals[0]
+    # asin(s)/s - 1 by its series, over 4 s², s half the normals' difference.
+    s = ca.sumsqr(bend) / 4
+    arc = chord + (1 / 6 + s * (3 / 40 + s * (5 / 112 + s * 35 / 1152))) / 4 * ca.dot(chord, bend) * bend
+    # The mean of two rotations is short of a rotation; a step of Newton's towards the nearest one.
+    mean = (rotations[0] + rotations[1]) / 2
+    turned = ca.mtimes(mean, arc)
+    return 1.5 * turned - 0.5 * ca.mtimes(mean, ca.mtimes(mean.T, turned))
 
 
 def tangents(normal: SX, helper: SX) -> tuple[SX, SX]:

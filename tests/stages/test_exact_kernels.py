@@ -195,20 +195,20 @@ def on_cap(phi: float, spin: float, lean: float = 0.0) -> Knot:
     return centre + (TIP + BALL) * out, Rotation.from_rotvec([0, spin + lean, 0]), centre + TIP * out, lean
 
 
-def test_a_ball_that_rolls_over_a_cap_slips_only_to_third_order() -> None:
+def test_a_ball_that_rolls_over_a_cap_slips_only_to_fifth_order() -> None:
     # Rolling without slip it turns by the path over the cap's radius and its own.
     slips = []
     for phi in (0.4, 0.2, 0.1):
         found = rolls(on_cap(0.3, 0.0), on_cap(0.3 + phi, (1 + TIP / BALL) * phi))
         slips.append(np.linalg.norm(found["no_slip"]))
         assert found["spin"][0] < 1e-12
-    assert slips[0] < 0.02 * TIP
-    assert slips[0] / slips[1] == pytest.approx(8, rel=0.1)
-    assert slips[1] / slips[2] == pytest.approx(8, rel=0.1)
+    assert slips[0] < 1e-3 * TIP
+    assert slips[0] / slips[1] == pytest.approx(32, rel=0.1)
+    assert slips[1] / slips[2] == pytest.approx(32, rel=0.1)
 
 
-def test_a_wheel_that_rolls_along_a_link_slips_by_the_chord_s_lack() -> None:
-    # On the cylinder: a turn by a moves the wheel by its radius times a; the chord falls short by a³/6.
+def test_a_wheel_that_rolls_along_a_link_slips_only_to_fifth_order() -> None:
+    # On the cylinder: a turn by a moves the wheel by its radius times a. The mean of two rotations falls short by a²/8.
     def rolled(angle: float) -> Knot:
         height = 0.6 + BALL * angle
         return np.array([TIP + BALL, 0, height]), Rotation.from_rotvec([0, -angle, 0]), np.array([TIP, 0, height]), 0.0
@@ -216,15 +216,15 @@ def test_a_wheel_that_rolls_along_a_link_slips_by_the_chord_s_lack() -> None:
     for angle in (0.05, 0.2, 0.5):
         for way in (-1, 1):
             found = rolls(rolled(0.0), rolled(way * angle))
-            lack = BALL * (angle - np.sin(angle))
-            assert np.linalg.norm(found["no_slip"]) == pytest.approx(lack, rel=1e-3, abs=1e-7)
+            lack = BALL * angle * 1.5 * (angle**2 / 8) ** 2
+            assert np.linalg.norm(found["no_slip"]) == pytest.approx(lack, rel=0.1, abs=1e-8)
 
 
 def test_a_ball_that_slides_slips_by_its_path() -> None:
     # Not turning, it sweeps the path of both surfaces: the sum of the radii times the angle.
     phi = 0.1
     found = rolls(on_cap(0.3, 0.0), on_cap(0.3 + phi, 0.0))
-    path = (TIP + BALL) * np.sin(phi)
+    path = (TIP + BALL) * phi * np.cos(phi / 2)  # seen across the normal at its start
     assert np.linalg.norm(found["no_slip"]) == pytest.approx(path, rel=1e-6)
     assert found["slip"][0] == pytest.approx((path / STEP) ** 2, rel=1e-6)
 

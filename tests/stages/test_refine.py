@@ -167,7 +167,7 @@ def test_a_result_has_every_contact_in_its_own_place(made_up: MadeUp) -> None:
     assert refined.worst == Worst("a", ACCEPTED, None)
     # Nor is it a contact of the motion that is written: no link is there to touch.
     first, _, last = made_up.model.contact_names
-    motion = whole_hand_motion(made_up.model, hand)
+    motion = whole_hand_motion(made_up.model, replace(hand, fingers=start.fingers, angles=start.angles))
     assert motion.contact_names == (first, last, "ground")
     assert motion.contact_link == ("finger0_link0", "finger1_link1", "ground")
     np.testing.assert_array_equal(motion.contact_active, hand.active[:, [0, 2, 3]])

@@ -8,6 +8,7 @@ import pytest
 from casadi_hands.stages.object_side import tool_path
 from casadi_hands.stages.refine import WEIGHTS
 from casadi_hands.stages.refine_problem import Structure
+from tests.stages.blocks import surface
 from tests.stages.example import check_derivatives, doubling_each_weight, drawing, everything
 from tests.stages.refining import MadeUp, carrying, sketching
 
@@ -121,7 +122,7 @@ def test_the_ground_is_where_it_is_while_it_bears_load(loaded: MadeUp) -> None:
     exerted = np.array([r.apply(f) for r, f in zip(loaded.turns, loaded.forces[:, 2], strict=True)])
     touching = np.flatnonzero(loaded.touching[:, 2])
     assert touching.tolist() == list(range(10))
-    height = 0.001 / 0.0475
+    height, capsule = 0.001 / 0.0475, loaded.model.ground.capsule  # type: ignore[union-attr]
     np.testing.assert_allclose(found["ground.on_surfaces"][:, 1], world[touching, 2] - height, atol=1e-12)
     np.testing.assert_allclose(found["ground.pressing"].ravel(), exerted[touching, 2], atol=1e-12)
     # Half the ground's friction of 0.4 may be used.
@@ -129,8 +130,13 @@ def test_the_ground_is_where_it_is_while_it_bears_load(loaded: MadeUp) -> None:
     np.testing.assert_allclose(found["ground.cone"].ravel(), cone[touching], atol=1e-12)
     for row, k in zip(found["ground_rolling.no_slip"], range(9), strict=True):
         over = loaded.points[k + 1, 2] - loaded.points[k, 2]
-        path = (loaded.turns[k].apply(over) + loaded.turns[k + 1].apply(over)) / 2
-        np.testing.assert_allclose(row, (path - world[k + 1] + world[k])[:2], atol=1e-12)
+        # Along the chord stretched to an arc, and turned nearly as the object is halfway.
+        bend = np.subtract(*(surface(loaded.points[i, 2], capsule)[1] for i in (k + 1, k)))
+        sine = np.linalg.norm(bend) / 2
+        arc = over + (np.arcsin(sine) / sine - 1) * (over @ bend) / (bend @ bend) * bend
+        mean = (loaded.turns[k].as_matrix() + loaded.turns[k + 1].as_matrix()) / 2
+        halfway = mean @ (3 * np.eye(3) - mean.T @ mean) / 2
+        np.testing.assert_allclose(row, (halfway @ arc - world[k + 1] + world[k])[:2], atol=2e-3)
     second = loaded.values["force_pushed"].reshape(-1, 3, 3)[:, 2]
     held = [(k, f) for k, f in zip(loaded.stage.given.pushed, second, strict=True) if loaded.active[k, 3]]
     expected = [loaded.turns[k].apply(f)[2] for k, f in held]
