@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from casadi_hands.nlp.problem import Problem
+from casadi_hands.nlp.watch import Watch
 
 Vector = NDArray[np.float64]
 
@@ -20,7 +21,8 @@ Vector = NDArray[np.float64]
 class Options:
     """IPOPT's settings that the stages differ in; limits are iterations, never seconds.
 
-    The defaults are the loose tolerances that the soft stages need and no more.
+    The defaults are the loose tolerances that the soft stages need and no more. A solve also ends once a constraint's
+    multiplier exceeds ``most_multiplier``, see ``Watch``.
     """
 
     max_iter: int = 150
@@ -28,6 +30,7 @@ class Options:
     acceptable_tol: float = 1e-2
     constr_viol_tol: float = 1e-4
     mu_init: float = 1e-1
+    most_multiplier: float = np.inf
     extra: tuple[tuple[str, Any], ...] = ()
 
     def ipopt(self) -> dict[str, Any]:
@@ -95,6 +98,7 @@ class Solver:
         self.problem = problem
         self.functions = problem.functions()
         self._solvers: dict[Options, ca.Function] = {}
+        self._watches: dict[Options, Watch] = {}  # kept, since a solver does not keep its own alive
 
     def nlpsol(self, options: Options) -> ca.Function:
         """CasADi's function that runs IPOPT so, built when it is first asked for; ``stats()`` are of its last run."""
@@ -111,6 +115,9 @@ class Solver:
                 "jac_g": f["jac_g"],
                 "hess_lag": f["hess_lag"],
             }
+            if np.isfinite(options.most_multiplier):
+                sizes = self.problem.variables.size, self.problem.constraints.size
+                self._watches[options] = settings["iteration_callback"] = Watch(*sizes, options.most_multiplier)
             self._solvers[options] = ca.nlpsol("solver", "ipopt", f["nlp"], settings)
         return self._solvers[options]
 

@@ -22,7 +22,7 @@ from casadi_hands.stages.model import Model
 from casadi_hands.stages.outcome import design_change
 from casadi_hands.stages.refine import Refined
 from casadi_hands.stages.refine_values import Margin
-from casadi_hands.stages.sampling import shortened
+from casadi_hands.stages.sampling import resampled, resampled_model, shortened
 from casadi_hands.stages.whole_hand import WholeHand
 from casadi_hands.verify import replay, replay_many
 from casadi_hands.verify.simulation import load_mujoco
@@ -34,6 +34,9 @@ REPLAYS = 12  # perturbed ones, that a certified design is tried on
 DROPS = 1  # of them, that pass
 OUT_OF_REACH = 0.3  # half extents that a finger misses its contact by: nothing is left to refine
 SURELY = np.pi / 2  # that an object may turn so that contacts can surely go with it
+# What an exact motion misses only by how it goes between its samples; then it gets more of them.
+BETWEEN = {"residual_between", "gap_between", "slip", "penetration", "joint_limit"}
+FINEST = 0.02  # s between samples
 HANDS_REFINED = 2  # hands of one structure that are tried before fingers get another joint
 Ranked = tuple[tuple[int, int], Design]
 
@@ -151,17 +154,26 @@ class Refiner:
         if not refined.exact and not refined.barely_rolls and margin != SMALL:
             with self.record.stage("refine", "again, closer to the limits of friction and grip"):
                 second = self._attempt(whole, SMALL, again)
-            refined = second if second.exact or second.misses_less_than(refined) else refined
+            if second.exact or second.misses_less_than(refined):
+                refined, margin = second, SMALL
         judged = self._judged(refined, short, planned)
+        missed = {name for name, figure in judged.certificate.items() if not figure["holds"]}
+        step = self.model.schedule.step / 2
+        if refined.exact and missed & BETWEEN and step >= FINEST:
+            self.record.say("refine", f"again with samples {step:g} s apart: {judged.reason}")
+            finer = resampled_model(self.model, step)
+            hand = resampled(refined.hand, self.model, finer)
+            closer = Refiner(self.record, finer, self.judge, self.jobs).certify(hand, short, margin, near=True)
+            return min((judged, refined, REPLAYS), closer, key=lambda found: ranked(found[0], found[2])[0])
         drops = self._drops(judged)
         if drops > DROPS and margin != FIRM:
             text = f"again with a firmer grip: {drops} of {REPLAYS} replays dropped the object"
             with self.record.stage("refine", text):
                 firmer = self._attempt(whole, FIRM, partial(stage.solve, refined.hand, near=True))
-            again_judged = self._judged(firmer, short, planned)
-            fewer = self._drops(again_judged) if again_judged.status == "certified" else drops
+            design = self._judged(firmer, short, planned)
+            fewer = self._drops(design) if design.status == "certified" else drops
             if fewer < drops:
-                return again_judged, firmer, fewer
+                return design, firmer, fewer
         return judged, refined, drops
 
     def _attempt(self, whole: WholeHand, margin: Margin, way: Callable[..., Refined]) -> Refined:

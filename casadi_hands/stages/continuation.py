@@ -99,12 +99,13 @@ class Continuation:
         margin = margin or Margin()
         begun = resampled(start, self.model, self.coarse.model)
         refined = _named(f"{share:.0%} of the way,", self.coarse.take(LONG_WAY, begun, margin, share))
-        longest, before, step = refined, at_rest(refined.hand), (1 - share) / 2
+        longest, before, step = refined, at_rest(refined.hand), (1 - share) / 3
         before_share, runs = 0.0, refined.runs
         while longest.exact and longest.share < 1 and step >= SHORTEST:
-            share = min(1.0, longest.share + step)
+            share = longest.share + step
+            share = 1.0 if share > 1 - SHORTEST / 2 else share
             by = (share - longest.share) / (longest.share - before_share)
-            farther = extrapolated(before, longest.hand, by)
+            farther = extrapolated(self.coarse.model, before, longest.hand, by)
             refined = _named(f"{share:.0%} of the way,", self.coarse.take(SHORT_WAY, farther, margin, share))
             runs += refined.runs
             if refined.exact:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import casadi as ca
 from casadi import SX
 
+from casadi_hands.geometry import norm
 from casadi_hands.motion import conjugate, rotation_matrix
 from casadi_hands.nlp import Kernel
 from casadi_hands.stages.finger_symbols import FingerSymbols, PlacedFinger, morphology
@@ -78,7 +79,7 @@ class Scene:
         from_object = from_axis(point, self.capsule[:3], self.capsule[3:6])
         off_link = from_link + self.radius / self.capsule[6] * from_object
         here = symbols.placed(angles, on_link)
-        return Touch(on_link, off_object, off_link, normal, from_end / self.radius, rotation, here)
+        return Touch(on_link, off_object, off_link, normal, from_end / norm(from_end, 1e-6), rotation, here)
 
 
 def contact(joints: int, index: int, limited: bool) -> Kernel:

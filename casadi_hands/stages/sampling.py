@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from casadi_hands.motion import catmull_rom, held, linear
+from casadi_hands.stages.grasp import inward_normals, on_capsules
 from casadi_hands.stages.model import Model
 from casadi_hands.stages.whole_hand import WholeHand
 
@@ -54,18 +55,21 @@ def shortened(model: Model, share: float) -> Model:
     return replace(model, goal_positions=positions, goal_vectors=vectors, regrasp=None)
 
 
-def extrapolated(first: WholeHand, second: WholeHand, by: float) -> WholeHand:
-    """The second motion and ``by`` times what it differs by from the first, of one hand."""
+def extrapolated(model: Model, first: WholeHand, second: WholeHand, by: float) -> WholeHand:
+    """The second motion and ``by`` times what it differs by from the first, of one hand, contacts on the surface."""
 
     def beyond(a: Array, b: Array) -> Array:
         return b + by * (b - a)
 
+    points, capsules = beyond(first.point, second.point), model.capsules
+    if model.ground is not None:
+        capsules = np.vstack([capsules, model.ground.capsule])
     return replace(
         second,
         angles=tuple(beyond(a, b) for a, b in zip(first.angles, second.angles, strict=True)),
         position=beyond(first.position, second.position),
         vector=beyond(first.vector, second.vector),
-        point=beyond(first.point, second.point),
+        point=np.array([on_capsules(p, capsules, inward_normals(p, capsules)) for p in points]),
     )
 
 

@@ -114,7 +114,7 @@ def test_a_missing_parameter_and_unknown_names_are_named() -> None:
 def test_a_warm_start_at_the_solution_stays() -> None:
     cold = solve()
     extra = (("warm_start_init_point", "yes"), ("warm_start_bound_push", 1e-9), ("warm_start_mult_bound_push", 1e-9))
-    options = Options(200, 1e-8, 1e-8, 1e-8, 1e-8, extra)
+    options = Options(200, 1e-8, 1e-8, 1e-8, 1e-8, extra=extra)
     again = Solver(chain()).solve(cold.values, {"targets": TARGETS, **WEIGHTS}, options, warm=cold)
     assert again.iterations < cold.iterations
     np.testing.assert_allclose(again.values["points"], cold.values["points"], atol=1e-6)
@@ -191,3 +191,20 @@ def test_constraints_by_name_and_with_other_bounds(solution: Solution) -> None:
     np.testing.assert_allclose((ring.values["points"] ** 2).sum(axis=1), 1, atol=1e-8)
     inside = solve(upper={"points": 0.5}, lower={"points": -0.5}, constraints={"outside.radius": (0.6, np.inf)})
     assert inside.violations["outside.radius"] == pytest.approx(0.1, abs=1e-3)
+
+
+def test_a_solve_ends_where_multipliers_show_that_constraints_contradict_each_other() -> None:
+    # Every point outside the unit circle and within a box that lies inside it.
+    inside = {"lower": {"points": np.full((3, 2), -0.5)}, "upper": {"points": np.full((3, 2), 0.5)}}
+    start, given = {"points": TARGETS}, {"targets": TARGETS, **WEIGHTS}
+    runs = [
+        Solver(chain()).solve(start, given, Options(max_iter=200, most_multiplier=limit), **inside)  # type: ignore[arg-type]
+        for limit in (np.inf, 10.0)
+    ]
+    assert [run.status == "User_Requested_Stop" for run in runs] == [False, True]
+    assert 0 < runs[1].iterations < runs[0].iterations
+    assert runs[1].violation > 0.4
+    # One that can be met is not disturbed.
+    assert solve().status == "Solve_Succeeded"
+    watched = Solver(chain()).solve(start, given, Options(max_iter=200, most_multiplier=1e7))
+    assert watched.status == "Solve_Succeeded"

@@ -172,3 +172,38 @@ def test_what_a_firmer_grip_changes_is_told_from_the_hand_before_any_refinement(
     Refiner(record, told, told, 1)._attempt(whole, FIRM, partial(solve, exact, near=True))  # type: ignore[arg-type]
     assert asked == [(exact, FIRM, True)]
     assert record.design.stages[-1]["design_change"] == {"from": whole, "to": firm}
+
+
+@pytest.mark.parametrize(("missed", "steps"), [("slip", [0.1, 0.05]), ("goal_angle", [0.1])])
+def test_what_is_missed_only_between_samples_gets_more_of_them(
+    monkeypatch: pytest.MonkeyPatch, missed: str, steps: list[float]
+) -> None:
+    model = build_model(ball_task())
+    tried: list[float] = []
+
+    class Once:
+        """Every motion is exact, and certified from 0.05 s between samples on."""
+
+        def __init__(self, model: Any, *_: Any) -> None:
+            tried.append(model.schedule.step)
+
+        def solve(self, start: Any, margin: Margin, near: bool = False) -> Any:
+            assert near == (len(tried) > 1)
+            return SimpleNamespace(exact=True, barely_rolls=False, hand=start, runs=(), weights={})
+
+    def judged(self: Refiner, *_: Any) -> Design:
+        fine = self.model.schedule.step < 0.06
+        figure = {"holds": fine, "value": 1.0}
+        return replace(self.record.design, status="certified" if fine else "feasible", certificate={missed: figure})
+
+    monkeypatch.setattr(certify, "Continuation", Once)
+    monkeypatch.setattr(certify, "resampled", lambda hand, before, after: hand)
+    monkeypatch.setattr(Refiner, "_attempt", lambda self, whole, margin, way: way(margin=margin))
+    monkeypatch.setattr(Refiner, "_judged", judged)
+    monkeypatch.setattr(Refiner, "_drops", lambda self, design: 0)
+    anything: Any = None
+    whole: Any = SimpleNamespace(contacts=(0, 1), fingers=(), active=None)
+    design, _, drops = Refiner(Record(ball_task(), None, lambda _: None), model, anything, 1).certify(whole, ())
+    assert tried == pytest.approx(steps)
+    assert design.status == ("certified" if len(steps) > 1 else "feasible")
+    assert drops == 0

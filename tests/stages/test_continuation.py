@@ -100,11 +100,11 @@ def test_near_motions_take_the_short_way_and_the_long_one_where_it_fails(start: 
 def test_a_motion_is_lengthened_until_it_reaches_its_goals(start: WholeHand) -> None:
     told = Told(lambda coarse, share: True)
     refined = told.lengthen(start, 0.5)
-    assert [share for *_, share, _ in told.taken] == [0.5, 0.75, 1.0, 1.0]
-    assert [way for _, way, *_ in told.taken] == [names(LONG_WAY), names(SHORT_WAY), names(SHORT_WAY), "exact"]
+    assert [share for *_, share, _ in told.taken] == pytest.approx([0.5, 2 / 3, 5 / 6, 1.0, 1.0])
+    assert [way for _, way, *_ in told.taken] == [names(LONG_WAY), *3 * [names(SHORT_WAY)], "exact"]
     # Each begins where the ones before lead: the object went as far as its share.
-    begun = [place - told.taken[1][3] for *_, place in told.taken[1:3]]
-    assert begun[1] == pytest.approx(0.25)
+    begun = np.diff([place for *_, place in told.taken[1:4]])
+    np.testing.assert_allclose(begun, 1 / 6)
     assert refined.exact
     assert refined.share == 1
     assert refined.runs[0][0] == "50% of the way, soft"
@@ -112,13 +112,13 @@ def test_a_motion_is_lengthened_until_it_reaches_its_goals(start: WholeHand) -> 
 
 def test_steps_get_shorter_where_they_fail_and_the_longest_exact_motion_is_kept(start: WholeHand) -> None:
     told = Told(lambda coarse, share: share < 0.8)
-    refined = told.lengthen(start, 0.5)
+    refined = told.lengthen(start, 0.1)
     shares = [share for coarse, _, share, _ in told.taken if coarse]
-    assert shares == [0.5, 0.75, 1.0, 0.875, 0.8125]
-    assert refined.share == 0.75
+    assert shares == pytest.approx([0.1, 0.4, 0.7, 1.0, 0.85, 0.775, 0.85])
+    assert refined.share == pytest.approx(0.775)
     assert not refined.exact
-    assert told.taken[-1][:3] == (False, "exact", 0.75)
-    assert SHORTEST > (1 - 0.5) / 2 / 2**3
+    assert told.taken[-1][:3] == (False, "exact", refined.share)
+    assert 0.3 / 2**2 > SHORTEST > 0.3 / 2**3
 
 
 def test_a_motion_that_fails_from_the_first_is_not_lengthened(start: WholeHand) -> None:

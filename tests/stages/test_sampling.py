@@ -10,7 +10,7 @@ import pytest
 from casadi_hands.motion import Schedule
 from casadi_hands.stages.sampling import at_rest, extrapolated, resampled, resampled_model, shortened
 from casadi_hands.stages.whole_hand import WholeHand
-from tests.stages.example import everything
+from tests.stages.example import everything, project
 from tests.stages.refining import carrying
 
 Array = np.ndarray
@@ -95,11 +95,14 @@ def test_goals_of_a_part_of_the_way_are_on_it() -> None:
 
 
 def test_motions_go_on_as_they_have_grown(start: WholeHand) -> None:
+    _, model = everything()
     still = at_rest(start)
     np.testing.assert_array_equal(still.position, np.tile(start.position[0], (len(start.position), 1)))
-    # From rest to a motion, and half as far again.
-    farther = extrapolated(still, start, 0.5)
+    # From rest to a motion, and half as far again, with contacts on the object.
+    farther = extrapolated(model, still, start, 0.5)
     np.testing.assert_allclose(farther.position, start.position + 0.5 * (start.position - start.position[0]))
     np.testing.assert_allclose(farther.angles[1], start.angles[1] + 0.5 * (start.angles[1] - start.angles[1][0]))
-    np.testing.assert_allclose(farther.point[3], 1.5 * start.point[3] - 0.5 * start.point[0])
+    for contact, capsule in enumerate(model.capsules):
+        expected = 1.5 * start.point[3, contact] - 0.5 * start.point[0, contact]
+        np.testing.assert_allclose(farther.point[3, contact], project(expected, capsule)[0], atol=1e-9)
     np.testing.assert_array_equal(farther.force, start.force)
