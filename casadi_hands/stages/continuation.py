@@ -24,6 +24,7 @@ from casadi_hands.stages.whole_hand import WholeHand
 
 COARSE = 0.2  # s between coarse knots, at most
 SERVES = 0.1  # cost of slip and of forces that no joint supplies, of a start that is nearly exact
+LAST = SHORT_WAY[-1:]
 SHORTEST = 0.05  # of the way, by which a motion is lengthened at least
 
 
@@ -71,15 +72,15 @@ class Continuation:
             ways.insert(0, SHORT_WAY)
             costs = self.fine.costs(SHORT_WAY[0], start, margin)
             if costs["slip"] + costs["passive_force"] < SERVES:
-                ways.insert(0, SHORT_WAY[-1:])
+                ways.insert(0, LAST)
         runs: tuple[tuple[str, Solution], ...] = ()
         for way in ways:
-            if way == SHORT_WAY[-1:] or self.coarse is self.fine:
+            if way == LAST or self.coarse is self.fine:
                 refined = self.fine.take(way, start, margin)
             else:
                 begun = resampled(start, self.model, self.coarse.model)
                 refined = _named("coarse", self.coarse.take(way, begun, margin))
-                refined = self._on_fine(refined, way[-1:], start, margin)
+                refined = self._on_fine(refined, start, margin)
             runs += refined.runs
             if refined.exact:
                 break
@@ -112,10 +113,10 @@ class Continuation:
                 before, before_share, longest = longest.hand, longest.share, refined
             else:
                 step /= 2
-        refined = self._on_fine(replace(longest, runs=runs), SHORT_WAY[-1:], start, margin)
+        refined = self._on_fine(replace(longest, runs=runs), start, margin)
         return replace(refined, exact=refined.exact and refined.share == 1)
 
-    def _on_fine(self, refined: Refined, way: tuple[Step, ...], start: WholeHand, margin: Margin) -> Refined:
+    def _on_fine(self, refined: Refined, start: WholeHand, margin: Margin) -> Refined:
         """A motion on coarse knots at the task's samples, made exact there if it is on the coarse ones."""
         if self.coarse is self.fine:
             return refined
@@ -128,8 +129,8 @@ class Continuation:
         if not refined.exact:
             return replace(refined, hand=hand)
         runs = refined.runs
-        for steps in (way, SHORT_WAY):
-            fine = self.fine.take(steps, hand, margin, refined.share)
+        for way in (LAST, SHORT_WAY):
+            fine = self.fine.take(way, hand, margin, refined.share)
             runs += fine.runs
             if fine.exact:
                 break
