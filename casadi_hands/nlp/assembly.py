@@ -19,6 +19,7 @@ from casadi_hands.nlp.kernel import Kernel
 from casadi_hands.nlp.machine_code import compiled
 
 Indices = NDArray[np.int64]
+_known: dict[str, KernelFunctions] = {}  # of this process, by what the kernel computes
 
 
 def to_dm(matrix: sparse.sparray) -> DM:
@@ -54,27 +55,35 @@ class KernelFunctions:
 
 
 def kernel_functions(kernel: Kernel, terms: list[str]) -> KernelFunctions:
-    """Differentiate a kernel; ``terms`` fixes the order of the weights."""
+    """Differentiate a kernel; ``terms`` fixes the order of the weights. Kernels that compute the same share theirs."""
     x, p = kernel.variables, kernel.parameters
-    weights, scale = SX.sym("weights", len(terms)), SX.sym("scale")
+    weights = SX.sym("weights", len(terms))
     values = ca.vertcat(*[kernel.terms[name] for name in terms]) if terms else SX.zeros(0, 1)
     g = ca.vertcat(*kernel.constraints.values()) if kernel.constraints else SX.zeros(0, 1)
     # What stands twice in them stands many times in their derivatives.
     values, g = ca.cse([values, g])
-    total = ca.dot(weights, values) if terms else SX(0)
-    multipliers = SX.sym("multipliers", g.numel())
+    value = Function("value", [x, p, weights], [ca.densify(values), ca.densify(g)])
+    same = value.serialize()
+    if same not in _known:
+        _known[same] = _differentiated(kernel.name, value, (x, p, weights), values, g)
+    return _known[same]
+
+
+def _differentiated(name: str, value: Function, inputs: tuple[SX, SX, SX], values: SX, g: SX) -> KernelFunctions:
+    x, _, weights = inputs
+    scale, multipliers = SX.sym("scale"), SX.sym("multipliers", g.numel())
+    total = ca.dot(weights, values) if values.numel() else SX(0)
     jacobian = ca.jacobian(g, x)
     hessian, _ = ca.hessian(scale * total + ca.dot(multipliers, g), x)
     upper = ca.triu(hessian)
-    inputs = [x, p, weights]
     functions = {
-        "value": Function("value", inputs, [ca.densify(values), ca.densify(g)]),
-        "gradient": Function("gradient", inputs, [total, ca.densify(ca.gradient(total, x))]),
-        "jacobian": Function("jacobian", inputs, [ca.densify(g), _nonzeros(jacobian)]),
+        "value": value,
+        "gradient": Function("gradient", [*inputs], [total, ca.densify(ca.gradient(total, x))]),
+        "jacobian": Function("jacobian", [*inputs], [ca.densify(g), _nonzeros(jacobian)]),
         "hessian": Function("hessian", [*inputs, scale, multipliers], [_nonzeros(upper)]),
     }
     return KernelFunctions(
-        **compiled(kernel.name, functions), jacobian_pattern=jacobian.sparsity(), hessian_pattern=upper.sparsity()
+        **compiled(name, functions), jacobian_pattern=jacobian.sparsity(), hessian_pattern=upper.sparsity()
     )
 
 

@@ -109,8 +109,11 @@ def test_machine_code_gives_the_very_numbers_of_the_interpreter(
     kernel: Kernel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     terms = list(kernel.terms)
+    monkeypatch.setattr("casadi_hands.nlp.assembly._known", {})
     fast = kernel_functions(kernel, terms)
+    assert kernel_functions(kernel, terms) is fast
     monkeypatch.setattr("casadi_hands.nlp.machine_code.compiler", lambda: None)
+    monkeypatch.setattr("casadi_hands.nlp.assembly._known", {})
     slow = kernel_functions(kernel, terms)
     rng = np.random.default_rng(3)
     for role in ("value", "gradient", "jacobian", "hessian"):

@@ -359,6 +359,7 @@ def test_where_the_short_way_leads_nowhere_the_long_one_is_taken(
     last, weights, options = continuation.SHORT_WAY[-1]
     vain = continuation.SHORT_WAY[0], (last, weights, replace(options, max_iter=1))
     monkeypatch.setattr(continuation, "SHORT_WAY", vain)
+    monkeypatch.setattr(continuation, "SERVES", 0.0)
     model, before = solved.model, solved.refined.hand
     # The second goal a little farther to the side.
     farther = replace(
