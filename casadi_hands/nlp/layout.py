@@ -66,46 +66,45 @@ class Rows:
     instance k.
     """
 
-    def __init__(self, matrix: Any, count: int) -> None:
-        """Take a matrix (count·d, variables) as it is."""
+    def __init__(self, matrix: Any, count: int, width: int) -> None:
+        """Take a matrix (count·width, variables) as it is."""
         self.matrix = sparse.csr_array(matrix)
-        self.count = count
-        self.width = self.matrix.shape[0] // count if count else 0
+        self.count, self.width = count, width
 
     @classmethod
     def of(cls, indices: NDArray[np.int64], size: int) -> Rows:
         """Rows that read the variables at ``indices`` (K, d) of a vector of ``size``."""
         flat = indices.reshape(-1)
         matrix = sparse.csr_array((np.ones(flat.size), (np.arange(flat.size), flat)), shape=(flat.size, size))
-        return cls(matrix, indices.shape[0])
+        return cls(matrix, *indices.shape)
 
     def combine(self, weights: ArrayLike) -> Rows:
         """Rows (T, d) that are the linear combinations ``weights`` (T, K) of these."""
         weights = np.asarray(weights, float)
         mixed = sparse.kron(sparse.csr_array(weights), sparse.eye_array(self.width)) @ self.matrix
-        return Rows(mixed, weights.shape[0])
+        return Rows(mixed, weights.shape[0], self.width)
 
     def take(self, indices: ArrayLike) -> Rows:
         """The rows of the given instances, in that order, repeats allowed."""
         picked = np.asarray(indices, int)
         rows = (picked[:, None] * self.width + np.arange(self.width)).reshape(-1)
-        return Rows(self.matrix[rows], len(picked))
+        return Rows(self.matrix[rows], len(picked), self.width)
 
     def entries(self, start: int, stop: int) -> Rows:
         """Entries ``start`` to ``stop`` of every row."""
         rows = (np.arange(self.count)[:, None] * self.width + np.arange(start, stop)).reshape(-1)
-        return Rows(self.matrix[rows], self.count)
+        return Rows(self.matrix[rows], self.count, stop - start)
 
     @classmethod
     def beside(cls, parts: Sequence[Rows]) -> Rows:
         """Rows whose entries are those of all parts, one after the other; all have the same count."""
         count, starts = parts[0].count, np.cumsum([0, *[part.matrix.shape[0] for part in parts]])
         rows = [
-            start + np.arange(len(p.matrix.indptr) - 1).reshape(count, -1)
+            start + np.arange(count * p.width).reshape(count, p.width)
             for start, p in zip(starts, parts, strict=False)
         ]
         stacked = sparse.csr_array(sparse.vstack([part.matrix for part in parts], format="csr"))
-        return cls(stacked[np.hstack(rows).reshape(-1)], count)
+        return cls(stacked[np.hstack(rows).reshape(-1)], count, sum(part.width for part in parts))
 
     def constant(self, count: int) -> Rows:
         """One row repeated for ``count`` instances."""

@@ -79,7 +79,7 @@ class Problem:
         parameters: Sequence[NDArray[np.int64]] = (),
         bounds: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
     ) -> None:
-        """Evaluate a kernel once for each row of its arguments.
+        """Evaluate a kernel once for each row of its arguments; with none, only its constraints' names are known.
 
         Args:
             kernel: the block.
@@ -93,6 +93,10 @@ class Problem:
         count, sizes = variables[0].count, kernel.variable_sizes
         _check_shapes(kernel.name, sizes, [(rows.count, rows.width) for rows in variables], (count,))
         _check_shapes(kernel.name, kernel.parameter_sizes, [p.shape for p in parameters], (count, 1))
+        first = self.constraints.size
+        self._constrain(kernel, count, bounds or {})
+        if not count:
+            return
         columns = self.variables.size
         blocks = [sparse.csr_array(r.matrix.copy()) for r in variables]
         for block in blocks:
@@ -108,8 +112,6 @@ class Problem:
             if f"weight.{term}" not in self.parameters:
                 self.parameters.add(f"weight.{term}", (1,))
         weights = np.array([self.parameters[f"weight.{term}"][0] for term in terms], int)
-        first = self.constraints.size
-        self._constrain(kernel, count, bounds or {})
         if kernel not in self._functions:
             self._functions[kernel] = kernel_functions(kernel, terms)
         functions = self._functions[kernel]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -13,11 +13,11 @@ from casadi_hands.errors import HandsError
 from casadi_hands.pipeline.judge import Judge
 from casadi_hands.pipeline.record import Record
 from casadi_hands.pipeline.refinement import failing_fingers, refined_reason
-from casadi_hands.pipeline.steps import adopt, run_search, run_whole_hand
+from casadi_hands.pipeline.steps import adopt, run_search, run_shortened, run_whole_hand
 from casadi_hands.reasons import Reason
 from casadi_hands.search.algorithm import Candidate, Found, Search, run_record
 from casadi_hands.stages.continuation import Continuation
-from casadi_hands.stages.floating import Floating, FloatingStage
+from casadi_hands.stages.floating import Floating
 from casadi_hands.stages.model import Model
 from casadi_hands.stages.outcome import design_change
 from casadi_hands.stages.refine import Refined
@@ -38,7 +38,6 @@ SURELY = np.pi / 2  # that an object may turn so that contacts can surely go wit
 BETWEEN = {"residual_between", "gap_between", "slip", "penetration", "joint_limit"}
 FINEST = 0.02  # s between samples
 HANDS_REFINED = 2  # hands of one structure that are tried before fingers get another joint
-Ranked = tuple[tuple[int, int], Design]
 
 
 class Certifier:
@@ -59,47 +58,50 @@ class Certifier:
         self.record, self.model, self.floating, self.search = record, model, floating, search
         self.judge, self.refiner = judge, Refiner(record, model, judge, jobs)
 
-    def run(self, found: Found, best: Ranked | None = None) -> Design:
+    def run(self, found: Found) -> Design:
         """Refine the best hand, the next best, then hands with one more joint where those failed.
 
         A certified hand whose replays drop the object makes way for the next best of its structure that does better.
+        The record's best design, which may be one from before, is returned.
 
         Args:
             found: by the search.
-            best: a design there is already, which is returned where none is better.
         """
         if found.farthest > OUT_OF_REACH:
             run_whole_hand(self.record, self.model, self.floating, found.candidates[0])
-            return better(best, ranked(self.judge.judge(self.record.design, found.short), REPLAYS))[1]
+            return self.record.offer(self.judge.judge(self.record.design, found.short), REPLAYS)
         while True:
             failing: set[str] = set()
             for candidate in found.candidates[:HANDS_REFINED]:
                 judged, refined, drops = self._certify(candidate, found.short)
+                best = self.record.offer(judged, drops)
                 if serves(judged, drops):
                     return judged
                 if judged.status != "certified":
                     self.record.say("refine", f"not certified: {judged.reason}")
-                best = better(best, ranked(judged, drops))
-                self.record.keep_best(best[1])
                 failing |= failing_fingers(self.model, refined)
                 if refined.barely_rolls:
                     break  # a structure that must slip will do so in any of its hands
             least = self._more_joints(found, failing)
-            if best is not None and (best[1].status == "certified" or least is None):
-                return best[1]
+            if best.status == "certified" or least is None:
+                return best
             self.record.say("synthesis", f"another joint for {', '.join(sorted(failing)) or 'the fingers with fewest'}")
             found = run_search(self.record, self.model, self.search, least)
 
     def _certify(self, candidate: Candidate, short: tuple[Reason, ...]) -> tuple[Design, Refined, int]:
         """Find a hand's motion and refine it; where contacts cannot go with the object, from a shorter one on."""
+        model, floating, share = self._begun
+        whole = run_whole_hand(self.record, model, floating, candidate)
+        return self.refiner.certify(whole, short, share=share)
+
+    @cached_property
+    def _begun(self) -> tuple[Model, Floating, float]:
+        """What refinements begin with: the task, or a share of its way that fingers can surely go with the object."""
         share = _within_reach(self.model) if self.model.held_back else 1.0
         if share == 1:
-            whole = run_whole_hand(self.record, self.model, self.floating, candidate)
-        else:
-            model, weights = shortened(self.model, share), dict(self.record.task.weights.floating)
-            floating = FloatingStage(model).solve(weights)
-            whole = run_whole_hand(self.record, model, floating, candidate)
-        return self.refiner.certify(whole, short, share=share)
+            return self.model, self.floating, share
+        model = shortened(self.model, share)
+        return model, run_shortened(self.record, model, self.floating), share
 
     def _more_joints(self, found: Found, failing: set[str]) -> dict[int, int] | None:
         """Joints of each finger for the next round; None when no failing finger may have more."""
@@ -148,33 +150,41 @@ class Refiner:
         """
         planned = self.record.design
         stage = Continuation(self.model, whole.contacts, tuple(f.joints for f in whole.fingers), whole.active)
-        again = partial(stage.solve if share == 1 else partial(stage.lengthen, share=share), whole)
-        with self.record.stage("refine", "the same motion with exact physics, rolling contacts and clearance"):
-            refined = self._attempt(whole, margin, partial(again, near=True) if near else again)
-        if not refined.exact and not refined.barely_rolls and margin != SMALL:
-            with self.record.stage("refine", "again, closer to the limits of friction and grip"):
-                second = self._attempt(whole, SMALL, again)
-            if second.exact or second.misses_less_than(refined):
-                refined, margin = second, SMALL
-        judged = self._judged(refined, short, planned)
-        missed = {name for name, figure in judged.certificate.items() if not figure["holds"]}
-        step = self.model.schedule.step / 2
-        if refined.exact and missed & BETWEEN and step >= FINEST:
-            self.record.say("refine", f"again with samples {step:g} s apart: {judged.reason}")
-            finer = resampled_model(self.model, step)
-            hand = resampled(refined.hand, self.model, finer)
-            closer = Refiner(self.record, finer, self.judge, self.jobs).certify(hand, short, margin, near=True)
-            return min((judged, refined, REPLAYS), closer, key=lambda found: ranked(found[0], found[2])[0])
+        refined, margin = self._refined(stage, whole, margin, near, share)
+        judged = self._judged(stage.model, refined, short, planned)
+        while (step := stage.model.schedule.step / 2) >= FINEST and refined.exact and missed(judged) & BETWEEN:
+            finer = resampled_model(stage.model, step)
+            hand = resampled(refined.hand, stage.model, finer)
+            stage = Continuation(finer, stage.contacts, stage.joints, hand.active)
+            with self.record.stage("refine", f"again with samples {step:g} s apart: {judged.reason}"):
+                closer = self._attempt(whole, margin, partial(stage.renew, hand))
+            design = self._judged(finer, closer, short, planned)
+            if len(missed(design)) >= len(missed(judged)):
+                break
+            judged, refined = design, closer
         drops = self._drops(judged)
         if drops > DROPS and margin != FIRM:
             text = f"again with a firmer grip: {drops} of {REPLAYS} replays dropped the object"
             with self.record.stage("refine", text):
-                firmer = self._attempt(whole, FIRM, partial(stage.solve, refined.hand, near=True))
-            design = self._judged(firmer, short, planned)
+                firmer = self._attempt(whole, FIRM, partial(stage.renew, refined.hand))
+            design = self._judged(stage.model, firmer, short, planned)
             fewer = self._drops(design) if design.status == "certified" else drops
             if fewer < drops:
                 return design, firmer, fewer
         return judged, refined, drops
+
+    def _refined(
+        self, stage: Continuation, whole: WholeHand, margin: Margin, near: bool, share: float
+    ) -> tuple[Refined, Margin]:
+        """The refinement with this margin or, where that is not exact and another may be, with a small one."""
+        again = partial(stage.solve if share == 1 else partial(stage.lengthen, share=share), whole)
+        with self.record.stage("refine", "the same motion with exact physics, rolling contacts and clearance"):
+            refined = self._attempt(whole, margin, partial(again, near=True) if near else again)
+        if refined.exact or refined.barely_rolls or margin == SMALL:
+            return refined, margin
+        with self.record.stage("refine", "again, closer to the limits of friction and grip"):
+            second = self._attempt(whole, SMALL, again)
+        return (second, SMALL) if second.exact or second.misses_less_than(refined) else (refined, margin)
 
     def _attempt(self, whole: WholeHand, margin: Margin, way: Callable[..., Refined]) -> Refined:
         """Refine with one margin, and record all solves, whether they serve or not."""
@@ -185,18 +195,21 @@ class Refiner:
         self.record.add_runs(runs)
         return result
 
-    def _judged(self, refined: Refined, short: tuple[Reason, ...], planned: Design) -> Design:
-        """Adopt a refined hand and have it judged.
+    def _judged(self, model: Model, refined: Refined, short: tuple[Reason, ...], planned: Design) -> Design:
+        """Adopt a refined hand, have it judged, and offer it.
 
         Args:
+            model: the task, with the samples of the refinement.
             refined: the hand.
             short: what its fingers could not do before.
             planned: the design before it was refined.
         """
-        self.record.set_costs("refine", refined.runs[-1][1], refined.weights)
-        adopt(self.record, self.model, refined.hand)
-        causes = [*short, *refined_reason(self.model, refined)]
-        return self.judge.judge(self.record.design, causes, None if refined.exact else planned)
+        self.record.set_costs("refine", refined.hand.solution, refined.weights)
+        adopt(self.record, model, refined.hand)
+        causes = [*short, *refined_reason(model, refined)]
+        design = self.judge.judge(self.record.design, causes, None if refined.exact else planned)
+        self.record.offer(design, REPLAYS)
+        return design
 
     def _drops(self, design: Design) -> int:
         """How many perturbed replays of a certified design drop the object; 0 where there is no simulator to ask."""
@@ -204,14 +217,14 @@ class Refiner:
             return 0
         try:
             load_mujoco()
+            with self.record.stage("refine", "replays of the certified motion"), tempfile.TemporaryDirectory() as files:
+                design.save(files)
+                if replay(files).dropped:
+                    return REPLAYS
+                return sum(r.dropped for r in replay_many(files, REPLAYS, jobs=self.jobs))
         except HandsError as error:
             self.record.say("refine", f"no replays: {error}")
             return 0
-        with self.record.stage("refine", "replays of the certified motion"), tempfile.TemporaryDirectory() as scratch:
-            design.save(scratch)
-            if replay(scratch).dropped:
-                return REPLAYS
-            return sum(r.dropped for r in replay_many(scratch, REPLAYS, jobs=self.jobs))
 
 
 def _within_reach(model: Model) -> float:
@@ -225,11 +238,6 @@ def serves(design: Design, drops: int) -> bool:
     return design.status == "certified" and drops <= DROPS
 
 
-def ranked(design: Design, drops: int) -> Ranked:
-    """A design behind what it misses: limits of the certificate first, then replays."""
-    return (sum(not figure["holds"] for figure in design.certificate.values()), drops), design
-
-
-def better(first: Ranked | None, second: Ranked) -> Ranked:
-    """The one that misses less; of equals the first."""
-    return second if first is None or second[0] < first[0] else first
+def missed(design: Design) -> set[str]:
+    """The figures of the certificate that do not hold."""
+    return {name for name, figure in design.certificate.items() if not figure["holds"]}

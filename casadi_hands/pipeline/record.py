@@ -44,7 +44,7 @@ class Record:
         self.task, self.out, self.report = task, out, report
         self.started = time.perf_counter()
         self.design = Design(task=task, status="failed", reason="nothing has been computed yet")
-        self.best: Design | None = None
+        self._best: tuple[tuple[int, int], Design] | None = None
 
     def say(self, stage: str, text: str) -> None:
         """Report progress."""
@@ -82,14 +82,26 @@ class Record:
         seconds = {**self.design.seconds, "total": time.perf_counter() - self.started}
         return replace(design, stages=self.design.stages, seconds=seconds)
 
-    def keep_best(self, design: Design) -> None:
-        """Write a judged design, which nothing unfinished shall take the place of."""
-        self.best = design
-        self.keep(design)
+    def offer(self, design: Design, drops: int) -> Design:
+        """Take a judged design for the best if it misses less than the best so far, and write it.
+
+        Args:
+            design: with its certificate; what misses fewer limits is better, of equals what is dropped less.
+            drops: how many replays drop its object, as many as there are where that is not known yet.
+
+        Returns:
+            the best design so far.
+        """
+        rank = sum(not figure["holds"] for figure in design.certificate.values()), drops
+        if self._best is None or rank < self._best[0]:
+            self._best = rank, design
+            self.keep(design)
+        return self._best[1]
 
     def keep_unfinished(self, reason: str) -> None:
-        """Write the design as it stands, not judged yet, unless there is a better one to be kept."""
-        self.keep(self.best or replace(self.design, reason=reason))
+        """Write the design as it stands, not judged yet, unless there is a judged one, which it shall not replace."""
+        if self._best is None:
+            self.keep(replace(self.design, reason=reason))
 
     def keep(self, design: Design) -> Design:
         """Complete a design and write it, if there is a place for it."""

@@ -87,6 +87,8 @@ _LIMITS = {  # by the constraint's kernel, without the finger's number, and name
 
 def failing_fingers(model: Model, refined: Refined) -> set[str]:
     """Names of the fingers that kept a motion from being exact; none if it cannot be laid to fingers."""
+    if refined.met:
+        return set()
     if refined.slips_hopelessly:
         most = max(refined.slips.values())
         return {name for name, slip in refined.slips.items() if slip > 0.3 * most}
@@ -98,7 +100,7 @@ def refined_reason(model: Model, refined: Refined) -> list[Reason]:
     """Why a refined motion is not exact; nothing if it is."""
     if refined.exact:
         return []
-    if refined.share < 1:
+    if refined.met:
         what = f"fingers can roll with the object over {refined.share:.0%} of the way to its goals, and no farther"
         advice = f"{_JOINTS}, thicker links (hand.link_radius) or a smaller turn of the object"
         return [Reason(what, advice, frozenset(("goal_position", "goal_angle")))]

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from casadi_hands.design import Design
 from casadi_hands.errors import SolveError
-from casadi_hands.pipeline.certify import REPLAYS, Certifier, Ranked, Refiner, ranked, serves
+from casadi_hands.pipeline.certify import REPLAYS, Certifier, Refiner, serves
 from casadi_hands.pipeline.judge import Judge
 from casadi_hands.pipeline.record import STAGES, Progress, Record
 from casadi_hands.pipeline.steps import adopt, prepare_search, run_floating, run_search, run_whole_hand
@@ -63,16 +63,12 @@ def solve(
     jobs = jobs or os.cpu_count() or 1
     record = Record(task, out, progress or (lambda _: None))
     with processes(jobs) if executor is None else nullcontext(executor) as workers:
-        best = None if start is None else _refine_again(record, start)
-        if best is not None:
-            if serves(best[1], best[0][1]):
-                return record.keep(best[1])
-            record.keep_best(best[1])
-        return record.keep(_run(record, until, workers, jobs, best))
+        design = None if start is None else _refine_again(record, start)
+        return record.keep(design or _run(record, until, workers, jobs))
 
 
-def _refine_again(record: Record, start: Path) -> Ranked:
-    """The hand and the motion of an earlier result, refined for the task as it is now."""
+def _refine_again(record: Record, start: Path) -> Design | None:
+    """The hand and the motion of an earlier result, refined for the task as it is now; None if another is needed."""
     earlier, model = Design.load(start), build_model(record.task)
     whole, margin = warm_start(earlier, record.task, model), kept_margin(earlier)
     adopt(record, model, whole)
@@ -80,15 +76,17 @@ def _refine_again(record: Record, start: Path) -> Ranked:
     # Replays of one hand take about as long as other processes take to start.
     design, _, drops = Refiner(record, model, judge, jobs=1).certify(whole, (), margin, near=True)
     record.update(stages=[{**run, "started_from": str(start)} for run in record.design.stages])
-    if not serves(design, drops):
-        why = design.reason or f"{drops} of {REPLAYS} replays dropped the object"
-        record.say("refine", f"from the earlier result no hand serves: {why}; now all stages")
-        record.update(hand=None, motion=None, costs={})
-    return ranked(design, drops)
+    record.offer(design, drops)
+    if serves(design, drops):
+        return design
+    why = design.reason or f"{drops} of {REPLAYS} replays dropped the object"
+    record.say("refine", f"from the earlier result no hand serves: {why}; now all stages")
+    record.update(hand=None, motion=None, costs={})
+    return None
 
 
-def _run(record: Record, until: str, executor: Executor | None, jobs: int, best: Ranked | None) -> Design:
-    """All stages, to the last one asked for; ``best`` is a design there is already."""
+def _run(record: Record, until: str, executor: Executor | None, jobs: int) -> Design:
+    """All stages, to the last one asked for."""
     if executor is not None and until != "floating":
         start_up(executor, jobs)
     model = build_model(record.task)
@@ -104,7 +102,7 @@ def _run(record: Record, until: str, executor: Executor | None, jobs: int, best:
     if until == "whole_hand":
         run_whole_hand(record, model, floating, found.candidates[0])
         return judge.judge(record.design, found.short)
-    return Certifier(record, model, floating, search, judge, jobs).run(found, best)
+    return Certifier(record, model, floating, search, judge, jobs).run(found)
 
 
 def _stopped(design: Design, stage: str) -> Design:

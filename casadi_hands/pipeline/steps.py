@@ -7,7 +7,7 @@ from concurrent.futures import Executor
 
 from casadi_hands.pipeline.record import Record
 from casadi_hands.search.algorithm import Candidate, Found, Search, run_record
-from casadi_hands.stages.floating import Floating, solve_floating
+from casadi_hands.stages.floating import Floating, FloatingStage, solve_floating
 from casadi_hands.stages.model import Model
 from casadi_hands.stages.outcome import floating_motion, hand_of, joint_loads, whole_hand_motion
 from casadi_hands.stages.target import target_of
@@ -19,11 +19,24 @@ def run_floating(record: Record, model: Model) -> Floating:
     task = record.task
     with record.stage("floating", f"object's motion with {model.contacts} floating contacts"):
         result = solve_floating(model, dict(task.weights.floating))
-    record.add_runs([run_record("floating", what, task.search.seed, what, s) for what, s in result.runs])
+    _add_floating_runs(record, result)
     record.set_costs("floating", result.solution, dict(task.weights.floating))
     record.update(motion=floating_motion(result.model, result))
     record.keep_unfinished("stopped before a hand was designed")
     return result
+
+
+def run_shortened(record: Record, model: Model, whole: Floating) -> Floating:
+    """Stage 1 over a share of the way to the goals, with the contacts that act over the whole of it."""
+    with record.stage("floating", "object's motion over a part of the way, which fingers can surely go with it"):
+        result = FloatingStage(model).solve_as(whole, dict(record.task.weights.floating))
+    _add_floating_runs(record, result)
+    return result
+
+
+def _add_floating_runs(record: Record, result: Floating) -> None:
+    seed = record.task.search.seed
+    record.add_runs([run_record("floating", what, seed, what, solution) for what, solution in result.runs])
 
 
 def prepare_search(record: Record, model: Model, floating: Floating, executor: Executor | None) -> Search:

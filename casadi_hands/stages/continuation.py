@@ -71,7 +71,7 @@ class Continuation:
         if near:
             ways.insert(0, SHORT_WAY)
             costs = self.fine.costs(SHORT_WAY[0], start, margin)
-            if costs["slip"] + costs["passive_force"] < SERVES:
+            if costs.get("slip", 0.0) + costs.get("passive_force", 0.0) < SERVES:
                 ways.insert(0, LAST)
         runs: tuple[tuple[str, Solution], ...] = ()
         for way in ways:
@@ -85,6 +85,15 @@ class Continuation:
             if refined.exact:
                 break
         return replace(refined, runs=runs)
+
+    def renew(self, start: WholeHand, margin: Margin | None = None) -> Refined:
+        """Refine a motion that is exact already, but for other samples or another margin.
+
+        Args:
+            start: the motion, at the task's samples.
+            margin: to keep to the limits.
+        """
+        return self._nearby(start, margin or Margin(), 1.0)
 
     def lengthen(self, start: WholeHand, share: float, margin: Margin | None = None) -> Refined:
         """Refine a motion over a share of the way to its goals, and lengthen it until it reaches them.
@@ -100,21 +109,20 @@ class Continuation:
         margin = margin or Margin()
         begun = resampled(start, self.model, self.coarse.model)
         refined = _named(f"{share:.0%} of the way,", self.coarse.take(LONG_WAY, begun, margin, share))
-        longest, before, step = refined, at_rest(refined.hand), (1 - share) / 3
+        longest, before, step = refined, at_rest(refined.hand), max((1 - share) / 3, SHORTEST)
         before_share, runs = 0.0, refined.runs
-        while longest.exact and longest.share < 1 and step >= SHORTEST:
+        while longest.met and longest.share < 1 and step >= SHORTEST:
             share = longest.share + step
             share = 1.0 if share > 1 - SHORTEST / 2 else share
             by = (share - longest.share) / (longest.share - before_share)
             farther = extrapolated(self.coarse.model, before, longest.hand, by)
             refined = _named(f"{share:.0%} of the way,", self.coarse.take(SHORT_WAY, farther, margin, share))
             runs += refined.runs
-            if refined.exact:
+            if refined.met:
                 before, before_share, longest = longest.hand, longest.share, refined
             else:
                 step /= 2
-        refined = self._on_fine(replace(longest, runs=runs), start, margin)
-        return replace(refined, exact=refined.exact and refined.share == 1)
+        return self._on_fine(replace(longest, runs=runs), start, margin)
 
     def _on_fine(self, refined: Refined, start: WholeHand, margin: Margin) -> Refined:
         """A motion on coarse knots at the task's samples, made exact there if it is on the coarse ones."""
@@ -126,15 +134,21 @@ class Continuation:
             palm_quaternion=start.palm_quaternion,
             active=start.active,
         )
-        if not refined.exact:
+        if not refined.met:
             return replace(refined, hand=hand)
-        runs = refined.runs
+        fine = self._nearby(hand, margin, refined.share)
+        slips = fine.slips if fine.slips_hopelessly else refined.slips
+        return replace(fine, runs=refined.runs + fine.runs, slips=slips)
+
+    def _nearby(self, start: WholeHand, margin: Margin, share: float) -> Refined:
+        """The exact motion near one that is nearly so, on the fine knots, by the last step alone if that is enough."""
+        runs: tuple[tuple[str, Solution], ...] = ()
         for way in (LAST, SHORT_WAY):
-            fine = self.fine.take(way, hand, margin, refined.share)
-            runs += fine.runs
-            if fine.exact:
+            refined = self.fine.take(way, start, margin, share)
+            runs += refined.runs
+            if refined.met:
                 break
-        return replace(fine, runs=runs, slips=refined.slips)
+        return replace(refined, runs=runs)
 
 
 def _named(prefix: str, refined: Refined) -> Refined:

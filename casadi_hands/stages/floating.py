@@ -26,7 +26,8 @@ from casadi_hands.stages.regrasp import held_back, planned_regrasp
 Array = NDArray[np.float64]
 THRESHOLDS = (0.1, 0.2, 0.3)
 REGRASP_ROOM = 0.15  # half extents about its patches, for a contact that is taken anew
-OPTIONS = Options(max_iter=300, tol=1e-4, acceptable_tol=1e-3, extra=(("mu_strategy", "adaptive"),))
+# An adaptive barrier is quickest here, but without a bound it was seen to grow until nothing converged.
+OPTIONS = Options(max_iter=300, tol=1e-4, acceptable_tol=1e-3, extra=(("mu_strategy", "adaptive"), ("mu_max", 0.1)))
 
 
 @dataclass(frozen=True)
@@ -139,7 +140,7 @@ class FloatingStage:
         """Solve again with the model's planned regrasp, from the motion without it; None where it fails the gate."""
         assert self.model.regrasp is not None
         parameters = object_parameters(self.model) | term_weights(self.solver.problem, self.model, weights)
-        keyframes, contacts = len(before.pose), sizes(self.model)[2]
+        keyframes = len(before.pose)
         start = {**before.solution.values, "point": self.model.keyframe_patches.reshape(keyframes, -1)}
         flags = (before.active & ~self.model.regrasp.lifted).astype(float)
         fixed = {"activity": flags}
@@ -151,14 +152,30 @@ class FloatingStage:
         solution = self.solver.solve({**start, **fixed}, parameters, OPTIONS, lower=lower, upper=upper)
         if not passes_gate(self.model, solution.values, pivots=True):
             return None
+        what = "regrasp" if self.model.regrasp.lifted.any() else "held back"
+        return self._like(before, flags, solution, (*before.runs, (what, solution)))
+
+    def solve_as(self, other: Floating, weights: Mapping[str, float]) -> Floating:
+        """Solve for another task's motion of the same object, with the contacts active that are in a given one."""
+        parameters = object_parameters(self.model) | term_weights(self.solver.problem, self.model, weights)
+        flags = other.active.astype(float)
+        fixed = {"activity": flags}
+        solution = self.solver.solve({**self.start(), **fixed}, parameters, OPTIONS, lower=fixed, upper=fixed)
+        return self._like(other, flags, solution, (("part of the way", solution),))
+
+    def _like(
+        self, other: Floating, flags: Array, solution: Solution, runs: tuple[tuple[str, Solution], ...]
+    ) -> Floating:
+        """A solution as a motion whose contact invariants are another's."""
+        values, contacts = solution.values, sizes(self.model)[2]
         return replace(
-            before,
-            pose=solution.values["pose"],
-            point=solution.values["point"].reshape(-1, contacts, 3),
-            force=solution.values["force"].reshape(-1, contacts, 3),
+            other,
+            pose=values["pose"],
+            point=values["point"].reshape(-1, contacts, 3),
+            force=values["force"].reshape(-1, contacts, 3),
             active=flags > 0.5,
             solution=solution,
-            runs=(*before.runs, ("regrasp" if self.model.regrasp.lifted.any() else "held back", solution)),
+            runs=runs,
             model=self.model,
         )
 

@@ -79,34 +79,36 @@ class Worst:
 
 @dataclass(frozen=True)
 class Refined:
-    """A motion that meets its constraints, or how far it got.
+    """A motion that was refined.
 
     Attributes:
         hand: as the whole-hand stage's, with the design as it is now.
-        exact: whether every constraint is met within ``ACCEPTED``.
-        worst: of the last solve.
+        met: whether every constraint is met within ``ACCEPTED``.
+        worst: of the motion's constraints.
         slips: for each contact the slip that its last soft solve was left with, half extents.
+        slips_hopelessly: whether the firm solves were left with so much slip that no exact one was tried.
         runs: every solve: (what, solution).
-        weights: of the terms in the last.
+        weights: of the terms of the motion's solve.
         share: of the way to its goals that the motion goes.
     """
 
     hand: WholeHand
-    exact: bool
+    met: bool
     worst: Worst
     slips: dict[str, float]
+    slips_hopelessly: bool
     runs: tuple[tuple[str, Solution], ...]
     weights: dict[str, float]
     share: float = 1.0
 
+    @property
+    def exact(self) -> bool:
+        """Whether the motion meets its constraints and goes all the way to its goals."""
+        return self.met and self.share == 1
+
     def misses_less_than(self, other: Refined) -> bool:
         """Whether the motion goes farther, or as far with less violation."""
         return (-self.share, self.worst.violation) < (-other.share, other.worst.violation)
-
-    @property
-    def slips_hopelessly(self) -> bool:
-        """Whether the firm solves were left with so much slip that no exact one was tried."""
-        return not self.runs[-1][0].endswith("exact")
 
     @property
     def barely_rolls(self) -> bool:
@@ -202,13 +204,14 @@ class RefineStage:
             solution=solution,
         )
         worst = self._worst(solution)
-        exact = runs[-1][0] == "exact" and worst.violation <= ACCEPTED
-        return Refined(hand, exact, worst, slips, tuple(runs), weights)
+        hopeless = runs[-1][0] != "exact"
+        met = not hopeless and worst.violation <= ACCEPTED
+        return Refined(hand, met, worst, slips, hopeless, tuple(runs), weights)
 
     def _worst(self, solution: Solution) -> Worst:
         name, violation = max(solution.violations.items(), key=lambda item: item[1])
         knots = self.built.knots_of.get(name.split(".")[0])
-        if knots is None:
+        if knots is None or violation == 0:
             return Worst(name, violation, None)
         excess = solution.excess[name]
         instance = int(excess.reshape(len(knots), -1).max(axis=1).argmax())

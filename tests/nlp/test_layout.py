@@ -69,3 +69,11 @@ def test_rows_beside_each_other_have_the_entries_of_all() -> None:
     rows = Rows.beside([Rows.of(first, 20), Rows.of(second, 20), Rows.of(first, 20).entries(1, 2)])
     assert (rows.count, rows.width) == (4, 6)
     np.testing.assert_array_equal((rows.matrix @ x).reshape(4, 6), np.hstack([x[first], x[second], x[first][:, 1:2]]))
+
+
+def test_rows_of_no_instance_keep_their_width() -> None:
+    rows = Rows.of(np.arange(12).reshape(4, 3), 12)
+    none = rows.take([])
+    assert (none.count, none.width) == (0, 3)
+    assert (none.entries(1, 3).count, none.entries(1, 3).width) == (0, 2)
+    assert Rows.beside([none, none.entries(0, 1)]).width == 4

@@ -208,3 +208,20 @@ def test_a_solve_ends_where_multipliers_show_that_constraints_contradict_each_ot
     assert solve().status == "Solve_Succeeded"
     watched = Solver(chain()).solve(start, given, Options(max_iter=200, most_multiplier=1e7))
     assert watched.status == "Solve_Succeeded"
+
+
+def test_a_kernel_without_instances_changes_nothing_and_its_constraints_have_no_values() -> None:
+    problem = Problem()
+    x = problem.variable("x", (3, 2), -1, 1)
+    kernel, idle = Kernel("near"), Kernel("idle")
+    for one in (kernel, idle):
+        a = one.variable("a", 2)
+        one.cost(f"from_{one.name}", a - 0.5)
+        one.constrain("sum", ca.sum1(a))
+    problem.bind(kernel, [x], [], {"sum": (-np.inf, 0.8)})
+    problem.bind(idle, [x.take([])], [], {"sum": (-np.inf, 0.0)})
+    solution = Solver(problem).solve({}, {"weight.from_near": 1.0}, constraints={"idle.sum": (0.0, 0.0)})
+    np.testing.assert_allclose(solution.values["x"], 0.4, atol=1e-4)
+    assert list(solution.terms) == ["from_near"]
+    assert solution.constraints["idle.sum"].shape == (0, 1)
+    assert solution.violations["idle.sum"] == 0

@@ -57,6 +57,7 @@ class Loop(Certifier):
         missed, worst, slips = self.verdicts[len(self.tried)]
         self.tried.append(candidate.joints)
         refined = SimpleNamespace(
+            met=False,
             slips_hopelessly=slips,
             barely_rolls=slips,
             slips={"left": 1.0, "right": 0.1},
@@ -128,9 +129,11 @@ def test_a_design_there_is_already_is_returned_where_no_hand_is_better(monkeypat
         loop = Loop(monkeypatch, [(first, "contact1.cone", False), (second, "contact1.cone", False)], max_joints=1)
         loop.dropped = [0, 0]
         status = "failed" if known[0] else "certified"
-        design = loop.run(
-            found((1, 1), (1, 1)), (known, replace(loop.record.design, status=status, reason="attempt 0"))
+        certificate = {str(i): {"holds": i >= known[0]} for i in range(9)}
+        loop.record.offer(
+            replace(loop.record.design, status=status, reason="attempt 0", certificate=certificate), known[1]
         )
+        design = loop.run(found((1, 1), (1, 1)))
         assert design.reason == f"attempt {best}"
 
 
@@ -139,7 +142,8 @@ def test_a_design_there_is_already_is_better_than_a_hand_far_from_its_contacts(
 ) -> None:
     loop = Loop(monkeypatch, [], max_joints=3)
     known = replace(loop.record.design, status="certified", reason="known")
-    assert loop.run(found((1, 1), farthest=0.31), ((0, REPLAYS), known)).reason == "known"
+    loop.record.offer(known, REPLAYS)
+    assert loop.run(found((1, 1), farthest=0.31)).reason == "known"
 
 
 def test_a_simulator_that_cannot_be_loaded_costs_no_certified_design(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -184,15 +188,19 @@ def test_what_is_missed_only_between_samples_gets_more_of_them(
     class Once:
         """Every motion is exact, and certified from 0.05 s between samples on."""
 
-        def __init__(self, model: Any, *_: Any) -> None:
-            tried.append(model.schedule.step)
+        contacts, joints = (0, 1), (1, 1)
 
-        def solve(self, start: Any, margin: Margin, near: bool = False) -> Any:
-            assert near == (len(tried) > 1)
+        def __init__(self, model: Any, *_: Any) -> None:
+            self.model = model
+
+        def solve(self, start: Any, margin: Margin) -> Any:
+            tried.append(self.model.schedule.step)
             return SimpleNamespace(exact=True, barely_rolls=False, hand=start, runs=(), weights={})
 
-    def judged(self: Refiner, *_: Any) -> Design:
-        fine = self.model.schedule.step < 0.06
+        renew = solve
+
+    def judged(self: Refiner, model: Any, *_: Any) -> Design:
+        fine = model.schedule.step < 0.06
         figure = {"holds": fine, "value": 1.0}
         return replace(self.record.design, status="certified" if fine else "feasible", certificate={missed: figure})
 

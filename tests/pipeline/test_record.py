@@ -59,7 +59,22 @@ def test_nothing_unfinished_takes_the_place_of_a_judged_design(tmp_path: Path) -
     kept = record([], tmp_path)
     kept.keep_unfinished("stopped early")
     assert Design.load(tmp_path).reason == "stopped early"
-    kept.keep_best(replace(kept.design, status="feasible", reason="slips a little"))
+    kept.offer(replace(kept.design, status="feasible", reason="slips a little"), 12)
     kept.keep_unfinished("stopped while another hand was tried")
     loaded = Design.load(tmp_path)
     assert (loaded.status, loaded.reason) == ("feasible", "slips a little")
+
+
+def test_the_best_design_is_written_as_soon_as_it_is_known(tmp_path: Path) -> None:
+    kept = record([], tmp_path)
+
+    def judged(reason: str, *missed: str) -> Design:
+        return replace(kept.design, reason=reason, certificate={name: {"holds": False} for name in missed})
+
+    offers = (("two", ("slip", "gap"), 12), ("one", ("gap",), 12), ("worse", ("slip", "gap"), 0))
+    offers += ("none", (), 12), ("equal", (), 12), ("fewer drops", (), 3), ("more", (), 5)
+    best = []
+    for reason, missed, drops in offers:
+        best.append(kept.offer(judged(reason, *missed), drops).reason)
+        assert Design.load(tmp_path).reason == best[-1]
+    assert best == ["two", "one", "one", "none", "none", "fewer drops", "fewer drops"]

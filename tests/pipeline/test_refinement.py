@@ -29,11 +29,12 @@ def refined(
     """A refinement that is left with one violation."""
     hand = SimpleNamespace(contacts=(0, 1), fingers=(SimpleNamespace(joints=2), SimpleNamespace(joints=1)))
     slips, runs = {"left": 0.02, "right": 0.4}, ((step, made_up_solution({})),)
-    return Refined(hand, False, Worst(constraint, violation, time), slips, runs, {}, share)  # type: ignore[arg-type]
+    worst, slips_hopelessly = Worst(constraint, violation, time), not step.endswith("exact")
+    return Refined(hand, False, worst, slips, slips_hopelessly, runs, {}, share)  # type: ignore[arg-type]
 
 
 def test_an_exact_motion_needs_no_reason() -> None:
-    assert refined_reason(ball(), replace(refined("contact0.passive", 0.0), exact=True)) == []
+    assert refined_reason(ball(), replace(refined("contact0.passive", 0.0), met=True)) == []
 
 
 def test_slip_is_laid_to_the_finger_that_slips_most() -> None:
@@ -68,7 +69,7 @@ def test_no_time_is_told_where_there_is_none() -> None:
 
 
 def test_how_far_a_hand_can_roll_is_told() -> None:
-    (reason,) = refined_reason(ball(), refined("contact0.on_link", 0.0, share=0.75))
+    (reason,) = refined_reason(ball(), replace(refined("contact0.on_link", 0.0, share=0.75), met=True))
     assert reason.what == "fingers can roll with the object over 75% of the way to its goals, and no farther"
     assert reason.explains == {"goal_position", "goal_angle"}
 

@@ -48,7 +48,7 @@ class Told(Continuation):
             moved.position = hand.position[:1] + share * np.linspace(0, 1, len(hand.position))[:, None]
             result = WholeHand(**vars(moved))
             exact = self.exact_where(coarse, share)
-            return Refined(result, exact, Worst("a.b", 0.0, None), {"left": share}, runs, {}, share)
+            return Refined(result, exact, Worst("a.b", 0.0, None), {"left": share}, False, runs, {}, share)
 
         return SimpleNamespace(model=model, take=take, costs=lambda *_: {"slip": 1.0, "passive_force": 0.0})
 
@@ -126,3 +126,18 @@ def test_a_motion_that_fails_from_the_first_is_not_lengthened(start: WholeHand) 
     refined = told.lengthen(start, 0.5)
     assert len(told.taken) == 1
     assert (refined.exact, refined.share) == (False, 0.5)
+
+
+def test_a_short_rest_of_the_way_is_gone_in_one_step(start: WholeHand) -> None:
+    told = Told(lambda coarse, share: True)
+    refined = told.lengthen(start, 0.96)
+    assert [share for coarse, _, share, _ in told.taken if coarse] == pytest.approx([0.96, 1.0])
+    assert refined.exact
+
+
+def test_a_motion_that_is_exact_but_for_its_samples_needs_no_coarse_knots(start: WholeHand) -> None:
+    told = Told(lambda coarse, share: len(told.taken) > 1)
+    refined = told.renew(start)
+    assert [(coarse, way) for coarse, way, *_ in told.taken] == [(False, "exact"), (False, names(SHORT_WAY))]
+    assert refined.exact
+    assert len(refined.runs) == 3
