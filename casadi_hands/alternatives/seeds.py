@@ -9,8 +9,6 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from casadi_hands.alternatives.folder import remove_alternatives, remove_surplus, seed_folder, write_ranking
 from casadi_hands.alternatives.ranking import Alternative, rank
 from casadi_hands.design import Design
@@ -18,9 +16,6 @@ from casadi_hands.errors import DesignError, SolveError
 from casadi_hands.export.folder import remove_design
 from casadi_hands.pipeline import STAGES, Progress, solve
 from casadi_hands.task import Task
-
-# What numbers may do to one seed and not to another; CasADi raises RuntimeError.
-_BROKEN_OFF = (SolveError, ArithmeticError, RuntimeError, np.linalg.LinAlgError)
 
 
 def explore(
@@ -70,13 +65,13 @@ def explore(
     report = progress or (lambda _: None)
     began = time.perf_counter()
     designs: dict[int, Design] = {}
-    errors: list[Exception] = []
+    errors: list[SolveError] = []
     for seed in seeds:
         folder = None if out is None else seed_folder(out, seed)
         told = _within(report, seed, time.perf_counter() - began)
         try:
             designs[seed] = solve(task, seed=seed, jobs=jobs, until=until, out=folder, executor=executor, progress=told)
-        except _BROKEN_OFF as error:
+        except SolveError as error:
             errors.append(error)
             if len(errors) == len(seeds):
                 raise  # not the seeds' fault

@@ -9,6 +9,7 @@ import numpy as np
 from casadi import SX
 from numpy.typing import NDArray
 
+_AXIS_KNOWN = 1e-4  # rad
 _ORDER = 14  # the series below are exact to 1e-12 for turns up to 1.8 pi
 
 
@@ -68,11 +69,8 @@ def nearest_exponential(rotation: NDArray[np.float64], expected: NDArray[np.floa
     import pinocchio as pin
 
     vector = pin.log3(np.asarray(rotation, float))
-    angle = float(np.linalg.norm(vector))
-    if angle > 1e-9:
-        axis = vector / angle
-    else:
-        length = float(np.linalg.norm(expected))
-        axis = np.asarray(expected, float) / length if length > 1e-9 else np.array([1.0, 0.0, 0.0])
-    candidates = [(angle + 2 * math.pi * k) * axis for k in (-2, -1, 0, 1, 2)]
+    # The axis of a turn this small is its rounding: whole turns go about the expected axis.
+    angle, length = float(np.linalg.norm(vector)), float(np.linalg.norm(expected))
+    axis = vector / angle if angle > _AXIS_KNOWN else np.asarray(expected, float) / max(length, 1e-9)
+    candidates = [vector + 2 * math.pi * k * axis for k in (-2, -1, 0, 1, 2)]
     return min(candidates, key=lambda candidate: float(np.linalg.norm(candidate - expected)))

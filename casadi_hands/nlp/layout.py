@@ -100,8 +100,7 @@ class Rows:
         """Rows whose entries are those of all parts, one after the other; all have the same count."""
         count, starts = parts[0].count, np.cumsum([0, *[part.matrix.shape[0] for part in parts]])
         rows = [
-            start + np.arange(count * p.width).reshape(count, p.width)
-            for start, p in zip(starts, parts, strict=False)
+            start + np.arange(count * p.width).reshape(count, p.width) for start, p in zip(starts, parts, strict=False)
         ]
         stacked = sparse.csr_array(sparse.vstack([part.matrix for part in parts], format="csr"))
         return cls(stacked[np.hstack(rows).reshape(-1)], count, sum(part.width for part in parts))

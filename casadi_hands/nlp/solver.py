@@ -147,7 +147,8 @@ class Solver:
             KeyboardInterrupt: the solve was interrupted.
         """
         problem, p = self.problem, self._parameters(parameters)
-        solver = self.nlpsol(options or Options())
+        options = options or Options()
+        solver = self.nlpsol(options)
         lbx = problem.variables.pack(lower or {}, problem.lower)
         ubx = problem.variables.pack(upper or {}, problem.upper)
         x0 = np.clip(problem.variables.pack(start, np.zeros(problem.variables.size)), lbx, ubx)
@@ -158,11 +159,14 @@ class Solver:
         arguments |= {"lbg": lbg, "ubg": ubg}
         if warm is not None and warm.multipliers:
             arguments |= {"lam_x0": warm.multipliers["x"], "lam_g0": warm.multipliers["g"]}
+        watch = self._watches.get(options)
+        if watch:
+            watch.interrupted = False
         started = time.perf_counter()
         answer = solver(**arguments)
         seconds = time.perf_counter() - started
-        if solver.stats()["return_status"] == "NonIpopt_Exception_Thrown":
-            # CasADi turns an interrupt into this status and goes on.
+        if solver.stats()["return_status"] == "NonIpopt_Exception_Thrown" or (watch and watch.interrupted):
+            # CasADi turns an interrupt into this status, or into an end that was asked for, and goes on.
             raise KeyboardInterrupt
         return self._solution(answer, p, (lbg, ubg), solver.stats(), seconds)
 

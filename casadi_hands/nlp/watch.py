@@ -25,6 +25,7 @@ class Watch(ca.Callback):
         scalar, x, g = Sparsity.scalar(), Sparsity.dense(variables), Sparsity.dense(constraints)
         self._sparsities = {"f": scalar, "x": x, "lam_x": x, "g": g, "lam_g": g}
         self._limit = limit
+        self.interrupted = False
         self.construct("watch", {})
 
     def get_n_in(self) -> int:
@@ -48,6 +49,10 @@ class Watch(ca.Callback):
         return self._sparsities.get(ca.nlpsol_out(index), Sparsity(0, 0))
 
     def eval(self, outputs: Sequence[DM]) -> list[DM]:
-        """1 to stop, after an iteration."""
-        multipliers = np.abs(outputs[ca.nlpsol_out().index("lam_g")].full())
-        return [DM(float(multipliers.max(initial=0.0) > self._limit))]
+        """1 to stop, after an iteration; an interrupt, which CasADi would swallow, is kept in ``interrupted``."""
+        try:
+            multipliers = np.abs(outputs[ca.nlpsol_out().index("lam_g")].full())
+            return [DM(float(multipliers.max(initial=0.0) > self._limit))]
+        except KeyboardInterrupt:
+            self.interrupted = True
+            return [DM(1.0)]

@@ -103,6 +103,13 @@ class Record:
         if self._best is None:
             self.keep(replace(self.design, reason=reason))
 
+    def broken_off(self, error: Exception) -> Design:
+        """The best design so far or, where none was judged, the failed one that there is."""
+        if self._best is not None:
+            return self._best[1]
+        why = f"the solve broke off: {str(error) or type(error).__name__}; another seed may not"
+        return replace(self.design, status="failed", reason=why)
+
     def keep(self, design: Design) -> Design:
         """Complete a design and write it, if there is a place for it."""
         design = self.complete(design)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Callable
 from concurrent.futures import Executor
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from casadi_hands.design import Design
 from casadi_hands.errors import SolveError
@@ -19,6 +22,10 @@ from casadi_hands.pipeline.warm import as_floating, kept_margin, warm_start
 from casadi_hands.search.work import processes, start_up
 from casadi_hands.stages.model import build_model
 from casadi_hands.task import Task
+
+_LOG = logging.getLogger(__name__)
+# What numbers may do from one start and not from another; CasADi raises RuntimeError.
+_BROKEN_OFF = (ArithmeticError, RuntimeError, np.linalg.LinAlgError)
 
 
 def solve(
@@ -47,7 +54,8 @@ def solve(
         progress: told what is being done.
 
     Returns:
-        The design; its status is earned by the audit of what is written.
+        The design; its status is earned by the audit of what is written. Where numbers break down on the way, it is
+        the best one so far, or what there is of it as failed.
 
     Raises:
         SolveError: ``until`` is not a stage, or not the last where there is a start; or the start is of a task of
@@ -63,8 +71,13 @@ def solve(
     jobs = jobs or os.cpu_count() or 1
     record = Record(task, out, progress or (lambda _: None))
     with processes(jobs) if executor is None else nullcontext(executor) as workers:
-        design = None if start is None else _refine_again(record, start)
-        return record.keep(design or _run(record, until, workers, jobs))
+        try:
+            design = None if start is None else _refine_again(record, start)
+            design = design or _run(record, until, workers, jobs)
+        except _BROKEN_OFF as error:
+            _LOG.debug("the solve broke off", exc_info=True)
+            design = record.broken_off(error)
+        return record.keep(design)
 
 
 def _refine_again(record: Record, start: Path) -> Design | None:

@@ -89,12 +89,13 @@ class Search:
         if not self.contacts:
             raise SolveError("no finger contact is ever active: the task needs no hand, or none could help")
         self.pools: dict[int, list[tuple[float, FingerSeed]]] = {c: [] for c in self.contacts}
+        self.grown: dict[int, int] = {}  # joints of the fingers in each pool
         self.runs: list[dict[str, Any]] = []
 
     def run(self, least: Mapping[int, int] | None = None) -> Found:
         """Grow all fingers from one joint, or from ``least[contact]``, until each is saturated."""
         joints = {c: max((least or {}).get(c, 1), 1) for c in self.contacts}
-        growing = set(self.contacts)
+        growing = {c for c in self.contacts if self.grown.get(c) != joints[c]}
         while True:
             self._grow(joints, sorted(growing))
             candidates = self._recombine(sum(joints.values()))
@@ -130,6 +131,7 @@ class Search:
 
         results = run_all(self.executor, design_finger, work, done)
         for c in growing:
+            self.grown[c] = joints[c]
             pool = [r for args, r in zip(work, results, strict=True) if args[1] == c]
             self.pools[c] = sorted(((_alone(r), r.fingers[0]) for r in pool), key=lambda pair: pair[0])
         for args, result in zip(work, results, strict=True):

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from casadi_hands.motion import Schedule, eased, held, linear, nearest_exponential
+from casadi_hands.motion import Schedule, eased, held, linear
 from casadi_hands.task import Task
 
 Array = NDArray[np.float64]
@@ -279,15 +279,8 @@ def _goals(task: Task) -> tuple[Array, Array, Array]:
     if task.draws:
         points = np.array([goal.tool_at for goal in task.motion], float)
         return points, np.zeros((len(points), 3)), np.array([1.0, 0.0, 0.0, 0.0])
-    stated = np.array([goal.rotation.vector for goal in task.motion], float)
-    first = pin.exp3(stated[0])
-    vectors = [np.zeros(3)]
-    for vector in stated[1:]:
-        parallel = np.linalg.norm(np.cross(stated[0], vector)) < 1e-9
-        expected = vector - stated[0] if parallel else vectors[-1]
-        vectors.append(nearest_exponential(pin.exp3(vector) @ first.T, expected))
     positions = np.array([goal.position for goal in task.motion], float)
-    return positions, np.array(vectors), quaternion(first)
+    return positions, task.goal_turns(), quaternion(task.motion[0].rotation.matrix)
 
 
 def _palm(task: Task, schedule: Schedule) -> tuple[Array, Array]:
@@ -310,6 +303,8 @@ def _perturbations(task: Task, schedule: Schedule) -> tuple[Array, Array]:
     forces, torques = np.zeros((2, len(schedule.samples), 3))
     for push in task.perturbations:
         during = (schedule.samples >= push.start - 1e-9) & (schedule.samples <= push.end + 1e-9)
+        if not during.any():  # a short one between two samples
+            during[np.argmin(np.abs(schedule.samples - (push.start + push.end) / 2))] = True
         forces[during] += np.asarray(push.force)
         torques[during] += np.asarray(push.torque)
     return forces, torques

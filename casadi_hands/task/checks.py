@@ -67,16 +67,12 @@ def _other_times(task: Task) -> Iterator[Problem]:
 
 
 def _turns(task: Task) -> Iterator[Problem]:
-    """Turns of goals from the first goal's orientation, where they are about one axis and so add up."""
-    first = task.motion[0].rotation.vector
-    for number, goal in enumerate(task.motion):
-        vector = goal.rotation.vector
-        if np.linalg.norm(np.cross(first, vector)) > 1e-9 * np.linalg.norm(first) * np.linalg.norm(vector):
-            continue
-        turn = float(np.degrees(np.linalg.norm(vector - first)))
-        if turn > _LARGEST_TURN * (1 + 1e-9):
-            allowed = f"a turn of at most ±{_LARGEST_TURN:g}° from the first goal's orientation; this one is {turn:g}°"
-            yield Problem(("motion", number, "rotation"), f"{goal.rotation.degrees:g} degrees", allowed)
+    """Turns of goals from the first goal's orientation."""
+    for number, turn in enumerate(np.degrees(np.linalg.norm(task.goal_turns(), axis=1))):
+        if turn > _LARGEST_TURN * (1 + 1e-6):
+            allowed = f"a turn of at most ±{_LARGEST_TURN:g}° from the first goal's orientation; this one is {turn:.4g}°"
+            degrees = task.motion[number].rotation.degrees
+            yield Problem(("motion", number, "rotation"), f"{degrees:.4g} degrees", allowed)
 
 
 def _object_places(task: Task) -> Iterator[Problem]:

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
 
+from casadi_hands.motion import nearest_exponential
 from casadi_hands.task.fields import Positive, Section, Vector, Whole, fill, refuse
 from casadi_hands.task.hand import Actuator, FingerSpec, Ground, HandSpec
 from casadi_hands.task.limits import Limits
@@ -114,6 +115,21 @@ class Task(Section):
         A drawing goal leaves the pose open; it is given with the object upright and the tool at its point.
         """
         return _poses(self.motion, self.tool)
+
+    def goal_turns(self) -> np.ndarray:
+        """Rotation vectors (G, 3), rad, world, of the object at every goal from its orientation at the first one.
+
+        Turns about the first goal's axis are as far as stated; others continue the turn to the goal before.
+        """
+        stated = np.array([goal.rotation.vector for goal in self.motion])
+        first = self.motion[0].rotation.matrix
+        turns = [np.zeros(3)]
+        for goal, vector in zip(self.motion[1:], stated[1:], strict=True):
+            parallel = np.linalg.norm(np.cross(stated[0], vector)) < 1e-9
+            turns.append(
+                nearest_exponential(goal.rotation.matrix @ first.T, vector - stated[0] if parallel else turns[-1])
+            )
+        return np.array(turns)
 
 
 def _poses(goals: tuple[Goal, ...], tool: Vector | None) -> tuple[tuple[float, np.ndarray, np.ndarray], ...]:

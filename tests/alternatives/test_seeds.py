@@ -96,7 +96,7 @@ def test_a_single_distinct_hand_has_no_menu(solves, tmp_path) -> None:
 
 
 def test_a_seed_that_breaks_off_is_listed_and_keeps_what_it_wrote(solves, tmp_path) -> None:
-    solves({0: RuntimeError("no memory left"), 1: certified(), 2: replace(example_design(), status="failed")})
+    solves({0: SolveError("no memory left"), 1: certified(), 2: replace(example_design(), status="failed")})
     found = explore(example_task(), seeds=[0, 1, 2], out=tmp_path)
     assert [(one.seed, one.design.status) for one in found] == [(1, "certified"), (2, "failed"), (0, "failed")]
     assert ranking(tmp_path)[2]["reason"] == "the solve broke off: no memory left"

@@ -102,3 +102,6 @@ def test_nearest_exponential_continues_a_motion(expected: list[float]) -> None:
 def test_nearest_exponential_of_no_turn_is_whole_turns() -> None:
     np.testing.assert_allclose(nearest_exponential(np.eye(3), np.array([0, 6.0, 0])), [0, 2 * np.pi, 0], atol=1e-12)
     np.testing.assert_allclose(nearest_exponential(np.eye(3), np.zeros(3)), 0, atol=1e-12)
+    # A whole turn about z from numbers with four digits, which leave a turn of rounding about some other axis.
+    rounded = Rotation.from_rotvec([5e-5, 0, 2 * np.pi]).as_matrix()
+    np.testing.assert_allclose(nearest_exponential(rounded, np.array([0, 0, 4.7])), [0, 0, 2 * np.pi], atol=1e-4)

@@ -210,6 +210,25 @@ def test_a_solve_ends_where_multipliers_show_that_constraints_contradict_each_ot
     assert watched.status == "Solve_Succeeded"
 
 
+def test_an_interrupt_while_multipliers_are_watched_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[int] = []
+
+    def look(_: object) -> np.ndarray:
+        seen.append(1)
+        if len(seen) == 3:
+            raise KeyboardInterrupt
+        return np.zeros(1)
+
+    start, given, options = {"points": TARGETS}, {"targets": TARGETS, **WEIGHTS}, Options(most_multiplier=1e7)
+    solver = Solver(chain())
+    with monkeypatch.context() as patched:
+        patched.setattr("casadi_hands.nlp.watch.np.abs", look)
+        with pytest.raises(KeyboardInterrupt):
+            solver.solve(start, given, options)
+    assert len(seen) == 3
+    assert solver.solve(start, given, options).status == "Solve_Succeeded"
+
+
 def test_a_kernel_without_instances_changes_nothing_and_its_constraints_have_no_values() -> None:
     problem = Problem()
     x = problem.variable("x", (3, 2), -1, 1)

@@ -12,7 +12,7 @@ import pytest
 from casadi_hands.design import Design
 from casadi_hands.errors import DesignError, SolveError
 from casadi_hands.pipeline import Progress, run, solve
-from casadi_hands.pipeline.certify import DROPS, FIRM, Refiner
+from casadi_hands.pipeline.certify import DROPS, FIRM, REPLAYS, Refiner
 from casadi_hands.pipeline.record import Record
 from casadi_hands.task import parse_task
 from tests.pipeline.test_warm import HELD, earlier, edited, pressing
@@ -105,3 +105,20 @@ def test_what_cannot_be_started_from_is_refused_before_anything_is_written(folde
         solve(parse_task(HELD), until="floating", start=folder)
     assert not (tmp_path / "out").exists()
     assert Design.load(folder).status == "certified"
+
+
+def test_where_numbers_break_down_the_best_design_so_far_is_the_result(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def breaks(*_: Any) -> Design:
+        raise RuntimeError("SVD did not converge")
+
+    monkeypatch.setattr(run, "_run", breaks)
+    design = solve(parse_task(HELD), jobs=1, out=tmp_path / "out")
+    assert design.status == "failed"
+    assert "the solve broke off: SVD did not converge" in design.reason
+    assert Design.load(tmp_path / "out").reason == design.reason
+    refined_as(monkeypatch, "certified", REPLAYS)
+    design = solve(parse_task(HELD), jobs=1, start=folder, out=tmp_path / "out")
+    assert design.status == "certified"
+    assert Design.load(tmp_path / "out").status == "certified"

@@ -101,6 +101,16 @@ def test_the_search_may_start_with_more_joints(monkeypatch: pytest.MonkeyPatch) 
     assert {(c, n) for c, n, _ in made_up.grown} == {(0, 1), (1, 2)}
 
 
+def test_fingers_whose_joints_stay_are_not_designed_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    made_up = MadeUp(monkeypatch, lambda h: [0.0, 0.0])
+    searching = search(ball_target())
+    searching.run()
+    first = searching.pools[0]
+    assert searching.run({0: 1, 1: 2}).candidates[0].joints == (1, 2)
+    assert [(c, n) for c, n, _ in made_up.grown] == [(0, 1)] * 3 + [(1, 1)] * 3 + [(1, 2)] * 3
+    assert searching.pools[0] is first
+
+
 def test_a_contact_that_never_acts_has_no_finger(monkeypatch: pytest.MonkeyPatch) -> None:
     made_up = MadeUp(monkeypatch, lambda h: [0.0])
     target = ball_target()

@@ -140,6 +140,16 @@ def test_gaps_and_slips_are_a_part_of_the_task_s_limits_and_never_large() -> Non
     assert (lax.gap_tolerance, lax.slip_tolerance) == (2e-4, 2e-3)
 
 
+def test_a_perturbation_between_two_samples_acts_at_the_nearest() -> None:
+    text = everything_text().replace("from: 0.3", "from: 0.33").replace("to: 0.9", "to: 0.36")
+    task = parse_task(text)
+    assert task.perturbations[0].end == 0.36
+    model = build_model(task)
+    pushed = model.schedule.samples[model.perturbation_torque.any(axis=1)]
+    (nearest,) = pushed
+    assert abs(nearest - 0.345) == np.abs(model.schedule.samples - 0.345).min()
+
+
 def test_perturbations_act_in_their_time_and_add_up() -> None:
     _, model = everything()
     weight = 0.2 * 9.81

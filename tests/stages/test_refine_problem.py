@@ -143,6 +143,18 @@ def test_the_ground_is_where_it_is_while_it_bears_load(loaded: MadeUp) -> None:
     np.testing.assert_allclose(found["ground_held.pressing"].ravel(), expected, atol=1e-12)
 
 
+def test_contacts_that_touch_only_at_the_end_do_not_roll() -> None:
+    # An object that is put down at the last sample, where a finger reaches it, too.
+    _, model = everything()
+    count = len(model.schedule.samples)
+    landing = MadeUp(model, (0, 2), lifted={0: (0, count - 1), 3: (0, count - 1)})
+    values = landing.constraints(dict.fromkeys(WEIGHTS, 1.0))
+    instances = {name: len(values[name]) for name in ("ground.pressing", "contact0.pressing", "contact2.pressing")}
+    assert instances == {"ground.pressing": 1, "contact0.pressing": 1, "contact2.pressing": count}
+    for name, rows in (("ground_rolling.no_slip", 0), ("rolling0.no_slip", 0), ("rolling2.no_slip", count - 1)):
+        assert len(values[name]) == rows
+
+
 def test_a_drawing_s_tool_is_held_to_its_path_at_every_knot(drawn: MadeUp) -> None:
     model, position = drawn.model, drawn.values["pose"][:, :3]
     tool = np.array([p + r.apply(model.tool) for p, r in zip(position, drawn.turns, strict=True)])

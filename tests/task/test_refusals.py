@@ -346,6 +346,17 @@ SPOILT = {
             "orientation; this one is 301°"
         ),
     ),
+    "turn too long in all": (  # each goal 170° farther about x, from a first one that is tilted by 90° about y
+        MOTION,
+        "motion:\n"
+        "  - {at: 0, position: [0.125, 0, 0.3], rotation: {axis: [0, 1, 0], degrees: 90}}\n"
+        "  - {at: 2, position: [0.125, 0, 0.3], rotation: {quaternion: [0.0616, 0.7044, 0.0616, 0.7044]}}\n"
+        "  - {at: 4, position: [0.125, 0, 0.3], rotation: {quaternion: [-0.6964, 0.1228, -0.6964, 0.1228]}}\n",
+        (
+            "13: motion[2].rotation: given 91.73 degrees; allowed: a turn of at most ±300° from the first goal's "
+            "orientation; this one is 340°"
+        ),
+    ),
     "object inside the palm": (
         "at: 0, position: [0.075,",
         "at: 0, position: [0.015,",
