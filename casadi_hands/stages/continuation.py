@@ -93,7 +93,7 @@ class Continuation:
             start: the motion, at the task's samples.
             margin: to keep to the limits.
         """
-        return self._nearby(start, margin or Margin(), 1.0)
+        return self.fine.take(LAST, start, margin or Margin())
 
     def lengthen(self, start: WholeHand, share: float, margin: Margin | None = None) -> Refined:
         """Refine a motion over a share of the way to its goals, and lengthen it until it reaches them.
@@ -136,19 +136,14 @@ class Continuation:
         )
         if not refined.met:
             return replace(refined, hand=hand)
-        fine = self._nearby(hand, margin, refined.share)
-        slips = fine.slips if fine.slips_hopelessly else refined.slips
-        return replace(fine, runs=refined.runs + fine.runs, slips=slips)
-
-    def _nearby(self, start: WholeHand, margin: Margin, share: float) -> Refined:
-        """The exact motion near one that is nearly so, on the fine knots, by the last step alone if that is enough."""
-        runs: tuple[tuple[str, Solution], ...] = ()
+        runs = refined.runs
         for way in (LAST, SHORT_WAY):
-            refined = self.fine.take(way, start, margin, share)
-            runs += refined.runs
-            if refined.met:
+            fine = self.fine.take(way, hand, margin, refined.share)
+            runs += fine.runs
+            if fine.met:
                 break
-        return replace(refined, runs=runs)
+        slips = fine.slips if fine.slips_hopelessly else refined.slips
+        return replace(fine, runs=runs, slips=slips)
 
 
 def _named(prefix: str, refined: Refined) -> Refined:

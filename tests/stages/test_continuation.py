@@ -135,9 +135,7 @@ def test_a_short_rest_of_the_way_is_gone_in_one_step(start: WholeHand) -> None:
     assert refined.exact
 
 
-def test_a_motion_that_is_exact_but_for_its_samples_needs_no_coarse_knots(start: WholeHand) -> None:
-    told = Told(lambda coarse, share: len(told.taken) > 1)
-    refined = told.renew(start)
-    assert [(coarse, way) for coarse, way, *_ in told.taken] == [(False, "exact"), (False, names(SHORT_WAY))]
-    assert refined.exact
-    assert len(refined.runs) == 3
+def test_a_motion_that_is_exact_but_for_its_samples_takes_the_last_step_alone(start: WholeHand) -> None:
+    told = Told(lambda coarse, share: True)
+    assert told.renew(start).exact
+    assert [(coarse, way) for coarse, way, *_ in told.taken] == [(False, "exact")]
