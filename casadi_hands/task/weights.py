@@ -66,7 +66,6 @@ class SynthesisWeights(_WeightTable):
     tip_target: Annealed = Field(
         default=(50.0, 10.0, 50.0), description="Fingertip at its contact (eq. 2.18), by annealing step."
     )
-    tip_on_surface: NonNegative = Field(default=1000.0, description="Contact on the fingertip's surface (eq. 2.19).")
     collision: Annealed = Field(
         default=(0.1, 5.0, 100.0), description="Bodies overlapping (eq. 2.20), by annealing step."
     )
@@ -87,7 +86,7 @@ class WholeHandWeights(FloatingWeights):
     contact_on_object: NonNegative = Field(default=100.0, description="Contact on the object's surface (eq. 2.10).")
     slip_on_object: NonNegative = Field(default=10.0, description="Change of the gap to the object (eq. 2.12).")
     contact_on_finger: NonNegative = Field(default=100.0, description="Contact on the fingertip's surface.")
-    slip_on_finger: NonNegative = Field(default=10.0, description="Change of the gap to the fingertip.")
+    slip_on_finger: NonNegative = Field(default=10.0, description="Slip of the contact along the fingertip.")
     joint_limits: NonNegative = Field(default=1.0, description="Joints beyond their limits (eq. 2.27).")
     finger_acceleration: NonNegative = Field(default=0.001, description="Acceleration of every fingertip.")
     collision: NonNegative = Field(default=100.0, description="Bodies overlapping (eq. 2.20).")
