@@ -6,6 +6,7 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
+from typing import Any
 
 from casadi_hands.design import Design
 from casadi_hands.pipeline.words import friction_reason, missed_figures, speed_reason, torque_reason
@@ -14,14 +15,16 @@ from casadi_hands.stages.floating import Floating
 from casadi_hands.stages.model import Model
 from casadi_hands.verify import audit
 
-FEASIBLE = {  # beyond these, where they are also beyond the limits, a motion is none: m, degrees, m·g
-    "goal_position": 0.001,
+# Beyond these, where they are also beyond the limits, a motion is none: lengths in half extents, degrees, m·g.
+FEASIBLE = {
+    "goal_position": 0.02,
     "goal_angle": 1.0,
     "residual": 0.1,
     "friction_excess": 0.05,
-    "gap": 0.001,
-    "penetration": 0.002,
+    "gap": 0.02,
+    "penetration": 0.04,
 }
+_LENGTHS = ("goal_position", "gap", "penetration")
 
 
 class Judge:
@@ -57,6 +60,9 @@ class Judge:
         planned = planned or design
         first = [self._friction, torque_reason(self.model, planned), speed_reason(self.model, planned)]
         reason = tell([*filter(None, first), *causes], missed_figures(design, verdict))
-        figures = {name: certificate[name] for name in FEASIBLE if name in certificate}
-        possible = all(f["holds"] or (f["value"] is not None and f["value"] <= FEASIBLE[n]) for n, f in figures.items())
+        possible = all(self._feasible(name, certificate[name]) for name in FEASIBLE if name in certificate)
         return replace(design, status="feasible" if possible else "failed", reason=reason, certificate=certificate)
+
+    def _feasible(self, name: str, figure: dict[str, Any]) -> bool:
+        limit = FEASIBLE[name] * (self.model.units.length if name in _LENGTHS else 1.0)
+        return bool(figure["holds"] or (figure["value"] is not None and figure["value"] <= limit))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from casadi_hands.motion import linear
 from casadi_hands.nlp import Options, Problem, Solution, Solver
@@ -26,8 +26,14 @@ from casadi_hands.stages.regrasp import held_back, planned_regrasp
 Array = NDArray[np.float64]
 THRESHOLDS = (0.1, 0.2, 0.3)
 REGRASP_ROOM = 0.15  # half extents about its patches, for a contact that is taken anew
-# An adaptive barrier is quickest here, but without a bound it was seen to grow until nothing converged.
-OPTIONS = Options(max_iter=300, tol=1e-4, acceptable_tol=1e-3, extra=(("mu_strategy", "adaptive"), ("mu_max", 0.1)))
+OPTIONS = Options(max_iter=300, tol=1e-4, acceptable_tol=1e-3)
+# An adaptive barrier is quickest, but without a bound it was seen to grow until nothing converged; a small one that
+# only shrinks is for where it still does not.
+BARRIERS = (
+    replace(OPTIONS, extra=(("mu_strategy", "adaptive"), ("mu_max", 0.1))),
+    replace(OPTIONS, mu_init=1e-2),
+)
+BROKEN = 1e-3  # violation of friction's cones: forces of zero meet them, so what leaves more has broken down
 
 
 @dataclass(frozen=True)
@@ -109,7 +115,7 @@ class FloatingStage:
         threshold passes, all contacts stay active.
         """
         parameters = object_parameters(self.model) | term_weights(self.solver.problem, self.model, weights)
-        free = self.solver.solve(self.start(), parameters, OPTIONS)
+        free = self._solved(self.start(), parameters)
         runs = [("free", free)]
         best: tuple[float, float, Solution] | None = None
         for flags, threshold in self._candidates(free.values["activity"]):
@@ -149,7 +155,7 @@ class FloatingStage:
         moved = np.any(patches != patches[0], axis=(0, 2))
         room = np.where(moved, REGRASP_ROOM, np.inf)[None, :, None]
         lower, upper = ({**fixed, "point": (patches + side * room).reshape(keyframes, -1)} for side in (-1, 1))
-        solution = self.solver.solve({**start, **fixed}, parameters, OPTIONS, lower=lower, upper=upper)
+        solution = self._solved({**start, **fixed}, parameters, lower, upper)
         if not passes_gate(self.model, solution.values, pivots=True):
             return None
         what = "regrasp" if self.model.regrasp.lifted.any() else "held back"
@@ -160,8 +166,23 @@ class FloatingStage:
         parameters = object_parameters(self.model) | term_weights(self.solver.problem, self.model, weights)
         flags = other.active.astype(float)
         fixed = {"activity": flags}
-        solution = self.solver.solve({**self.start(), **fixed}, parameters, OPTIONS, lower=fixed, upper=fixed)
+        solution = self._solved({**self.start(), **fixed}, parameters, fixed, fixed)
         return self._like(other, flags, solution, (("part of the way", solution),))
+
+    def _solved(
+        self,
+        start: Mapping[str, ArrayLike],
+        parameters: Mapping[str, Array | float],
+        lower: Mapping[str, Array] | None = None,
+        upper: Mapping[str, Array] | None = None,
+    ) -> Solution:
+        """The solution by the first barrier that does not break down, or the one that breaks down least."""
+        solutions: list[Solution] = []
+        for options in BARRIERS:
+            solutions.append(self.solver.solve(start, parameters, options, lower, upper))
+            if solutions[-1].violation <= BROKEN:
+                break
+        return min(solutions, key=lambda solution: solution.violation)
 
     def _like(
         self, other: Floating, flags: Array, solution: Solution, runs: tuple[tuple[str, Solution], ...]
@@ -193,4 +214,4 @@ class FloatingStage:
 
     def _with_flags(self, flags: Array, start: Solution, parameters: Mapping[str, Array | float]) -> Solution:
         fixed = {"activity": flags}
-        return self.solver.solve({**start.values, **fixed}, parameters, OPTIONS, lower=fixed, upper=fixed)
+        return self._solved({**start.values, **fixed}, parameters, fixed, fixed)

@@ -16,7 +16,8 @@ SLIPS = Figure("slip", 0.003, 0.0002, "m", "contact 'left' slips {value}")
     ("missed", "limit", "status"),
     [
         (0.0004, 0.0005, "feasible"),
-        (0.0009, 0.0005, "feasible"),
+        (0.00058, 0.0005, "feasible"),  # a fiftieth of half the object's extent of 3 cm
+        (0.00062, 0.0005, "failed"),
         (0.003, 0.0005, "failed"),
         (0.003, 0.005, "feasible"),  # within what this task's own limit allows
         (0.006, 0.005, "failed"),

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from casadi_hands.stages.floating import Floating, FloatingStage
+from casadi_hands.nlp import Solution
+from casadi_hands.stages.floating import BARRIERS, BROKEN, Floating, FloatingStage
 from casadi_hands.stages.grasp import passes_gate
 from casadi_hands.stages.model import Model, build_model
 from casadi_hands.task import Task, load_task, parse_task
@@ -198,3 +200,21 @@ def test_flags_are_fixed_by_bounds_and_the_result_passes_the_gate(turned: Solved
     assert passes_gate(model, floating.solution.values)
     assert floating.threshold in (0.1, 0.2, 0.3)
     assert rotations(model.reference).magnitude() < 1e-12
+
+
+def test_where_a_barrier_breaks_down_the_other_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    task = load_task(PROBLEMS / "horizontal_translation.yaml")
+    stage, weights = FloatingStage(build_model(task)), dict(task.weights.floating)
+    expected, solve = stage.solve(weights), stage.solver.solve
+    taken: list[bool] = []
+
+    def broken(start: object, parameters: object, options: object, *bounds: object) -> Solution:
+        solution = solve(start, parameters, options, *bounds)  # type: ignore[arg-type]
+        taken.append(options == BARRIERS[0])
+        return replace(solution, excess={"cone": np.full(1, 2 * BROKEN)}) if taken[-1] else solution
+
+    monkeypatch.setattr(stage.solver, "solve", broken)
+    found = stage.solve(weights)
+    assert taken == [True, False] * len(expected.runs)
+    assert found.solution.violation == 0
+    assert found.solution.objective == pytest.approx(expected.solution.objective, rel=1e-3)
