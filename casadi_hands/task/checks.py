@@ -70,7 +70,9 @@ def _turns(task: Task) -> Iterator[Problem]:
     """Turns of goals from the first goal's orientation."""
     for number, turn in enumerate(np.degrees(np.linalg.norm(task.goal_turns(), axis=1))):
         if turn > _LARGEST_TURN * (1 + 1e-6):
-            allowed = f"a turn of at most ±{_LARGEST_TURN:g}° from the first goal's orientation; this one is {turn:.4g}°"
+            allowed = (
+                f"a turn of at most ±{_LARGEST_TURN:g}° from the first goal's orientation; this one is {turn:.4g}°"
+            )
             degrees = task.motion[number].rotation.degrees
             yield Problem(("motion", number, "rotation"), f"{degrees:.4g} degrees", allowed)
 
