@@ -57,7 +57,6 @@ class Problem:
         self.constraint_lower: Vector = np.empty(0)
         self.constraint_upper: Vector = np.empty(0)
         self._bound: list[_Bound] = []
-        self._functions: dict[Kernel, KernelFunctions] = {}
 
     def variable(
         self, name: str, shape: tuple[int, int], lower: ArrayLike = -np.inf, upper: ArrayLike = np.inf
@@ -112,9 +111,7 @@ class Problem:
             if f"weight.{term}" not in self.parameters:
                 self.parameters.add(f"weight.{term}", (1,))
         weights = np.array([self.parameters[f"weight.{term}"][0] for term in terms], int)
-        if kernel not in self._functions:
-            self._functions[kernel] = kernel_functions(kernel, terms)
-        functions = self._functions[kernel]
+        functions = kernel_functions(kernel, terms)
         self._bound.append(_Bound(kernel, terms, weights, selector, positions, count, first, functions))
 
     def _constrain(self, kernel: Kernel, count: int, bounds: Mapping[str, tuple[ArrayLike, ArrayLike]]) -> None:

@@ -66,7 +66,6 @@ class Solution:
         status: IPOPT's own words; never taken as proof.
         iterations: number of iterations; 0 where IPOPT did not start.
         seconds: wall time.
-        multipliers: of bounds and constraints, to warm-start the next solve.
     """
 
     values: dict[str, Vector]
@@ -77,7 +76,6 @@ class Solution:
     status: str
     iterations: int
     seconds: float
-    multipliers: dict[str, Vector] = field(repr=False, default_factory=dict)
 
     @property
     def violations(self) -> dict[str, float]:
@@ -129,7 +127,6 @@ class Solver:
         lower: Mapping[str, ArrayLike] | None = None,
         upper: Mapping[str, ArrayLike] | None = None,
         constraints: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
-        warm: Solution | None = None,
     ) -> Solution:
         """Solve from ``start``.
 
@@ -140,7 +137,6 @@ class Solver:
             lower: variable -> lower bound, where it differs from the declared one.
             upper: variable -> upper bound, where it differs.
             constraints: ``kernel.constraint`` -> bounds, where they differ from those given when it was bound.
-            warm: an earlier solution whose multipliers are the start's.
 
         Raises:
             KeyError: a name that is not in the problem, or a parameter left out.
@@ -152,18 +148,14 @@ class Solver:
         lbx = problem.variables.pack(lower or {}, problem.lower)
         ubx = problem.variables.pack(upper or {}, problem.upper)
         x0 = np.clip(problem.variables.pack(start, np.zeros(problem.variables.size)), lbx, ubx)
-        arguments: dict[str, Any] = {"x0": x0, "p": p, "lbx": lbx, "ubx": ubx}
         lbg, ubg = problem.constraint_lower.copy(), problem.constraint_upper.copy()
         for name, (low, high) in (constraints or {}).items():
             lbg[problem.constraint_rows[name]], ubg[problem.constraint_rows[name]] = low, high
-        arguments |= {"lbg": lbg, "ubg": ubg}
-        if warm is not None and warm.multipliers:
-            arguments |= {"lam_x0": warm.multipliers["x"], "lam_g0": warm.multipliers["g"]}
         watch = self._watches.get(options)
         if watch:
             watch.interrupted = False
         started = time.perf_counter()
-        answer = solver(**arguments)
+        answer = solver(x0=x0, p=p, lbx=lbx, ubx=ubx, lbg=lbg, ubg=ubg)
         seconds = time.perf_counter() - started
         if solver.stats()["return_status"] == "NonIpopt_Exception_Thrown" or (watch and watch.interrupted):
             # CasADi turns an interrupt into this status, or into an end that was asked for, and goes on.
@@ -217,5 +209,4 @@ class Solver:
             # CasADi sets the count with the record of iterations; without one it is whatever memory held.
             iterations=int(stats["iter_count"]) if "iterations" in stats else 0,
             seconds=seconds,
-            multipliers={name: np.asarray(answer[f"lam_{name}"]).reshape(-1) for name in ("x", "g")},
         )

@@ -25,7 +25,6 @@ class Target:
         points: (N, C, 3) on the object's surface.
         normals: (N, C, 3) into the object.
         forces: (N, C, 3) on the object, m·g.
-        needed: (N, 6) wrench about the object's centre that the fingers make together, palm axes.
         centers: (N, 3) the object's centre of mass.
         active: (N, C) bool.
         pose: (N, 6) of the object in the world, as the floating stage has it.
@@ -36,7 +35,6 @@ class Target:
     points: Array
     normals: Array
     forces: Array
-    needed: Array
     centers: Array
     active: NDArray[np.bool_]
     pose: Array
@@ -110,7 +108,7 @@ def string_of(active: NDArray[np.bool_]) -> NDArray[np.int64]:
 def target_of(model: Model, floating: Floating) -> Target:
     """See a floating motion from the palm; contact points are moved onto the object's surface."""
     schedule, contacts = model.schedule, model.contacts
-    points, normals, forces, centers, needed = [], [], [], [], []
+    points, normals, forces, centers = [], [], [], []
     for k, sample in enumerate(schedule.keyframe_samples):
         rotation, position = palm_from_world(model, schedule.keyframes[k])
         pose = floating.pose[k]
@@ -123,14 +121,11 @@ def target_of(model: Model, floating: Floating) -> Target:
         normals.append(inward @ turn.T)
         forces.append(force @ turn.T)
         centers.append(center)
-        torque = np.cross(on_surface, force).sum(axis=0)
-        needed.append(np.concatenate([turn @ force.sum(axis=0), turn @ torque]))
     return Target(
         times=schedule.keyframes,
         points=np.array(points),
         normals=np.array(normals),
         forces=np.array(forces),
-        needed=np.array(needed),
         centers=np.array(centers),
         active=floating.active[:, :contacts],
         pose=floating.pose,

@@ -6,8 +6,6 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from rich.table import Table
-
 _UNITS = {
     "m": (1000.0, " mm"),
     "deg": (1.0, " deg"),
@@ -100,15 +98,3 @@ class Audit:
             }
             for name, figure in self.figures.items()
         }
-
-    def table(self) -> Table:
-        """Return the figures as a table for the terminal."""
-        table = Table(title=f"{self.name}: {'certified' if self.certified else 'not certified'}")
-        for column in ("figure", "value", "limit", "", "worst case"):
-            table.add_column(column, justify="right" if column in ("value", "limit") else "left")
-        for name, figure in self.figures.items():
-            limit = "" if figure.limit is None else show(figure.limit, figure.unit)
-            mark = "" if figure.limit is None else "[green]holds[/]" if figure.holds else "[red]missed[/]"
-            finding = "; ".join(self.problems) if name == "structure" and self.problems else figure.text
-            table.add_row(name.replace("_", " "), show(figure.value, figure.unit), limit, mark, finding)
-        return table
