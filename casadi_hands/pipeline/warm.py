@@ -88,8 +88,8 @@ def kept_margin(earlier: Design) -> Margin:
 def as_floating(model: Model, start: WholeHand) -> Floating:
     """What a start has of stage 1's motion: the object's poses and the contacts at the keyframes."""
     at = model.schedule.keyframe_samples
-    active = start.active[at]
-    return Floating(start.pose, start.point[at], start.force, active, active.astype(float), 0.0, _NOT_SOLVED, (), model)
+    pose, active = np.hstack([start.position, start.vector])[at], start.active[at]
+    return Floating(pose, start.point[at], start.force, active, active.astype(float), 0.0, _NOT_SOLVED, (), model)
 
 
 def _check_structure(earlier: Design, hand: Hand, task: Task) -> None:
@@ -139,7 +139,6 @@ def _retold(hand: Hand, motion: Motion, old: Model, model: Model) -> WholeHand:
     return WholeHand(
         fingers=tuple(fingers),
         contacts=tuple(sorted(contacts)),
-        pose=np.hstack(path)[at],
         angles=tuple(angles),
         palm_position=_spline(motion.time, motion.base_position / length)(when),
         palm_quaternion=np.array([quaternion(r) for r in _turns(motion.time, motion.base_orientation, when)]),
@@ -186,7 +185,6 @@ def _moved(was: WholeHand, task: Task, old: Model, model: Model) -> WholeHand:
     palm = _moved_palm(was, old, model) if task.palm.may_move else (model.palm_position, model.palm_quaternion)
     return replace(
         was,
-        pose=np.hstack([position, vector])[model.schedule.keyframe_samples],
         palm_position=palm[0],
         palm_quaternion=palm[1],
         position=position,

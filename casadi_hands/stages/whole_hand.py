@@ -41,7 +41,6 @@ class WholeHand:
     Attributes:
         fingers: morphology, one for each contact in ``contacts``; their ``angles`` are at the keyframes.
         contacts: index of each finger's contact.
-        pose: (N, 6) of the object at the keyframes.
         angles: for each finger (S, n), rad.
         palm_position: (S, 3) world.
         palm_quaternion: (S, 4).
@@ -55,7 +54,6 @@ class WholeHand:
 
     fingers: tuple[FingerSeed, ...]
     contacts: tuple[int, ...]
-    pose: Array
     angles: tuple[Array, ...]
     palm_position: Array
     palm_quaternion: Array
@@ -207,9 +205,8 @@ class WholeHandStage:
     def _result(self, solution: Solution, floating: Floating, fingers: tuple[FingerSeed, ...]) -> WholeHand:
         model, values, schedule = self.model, solution.values, self.model.schedule
         contacts = sizes(model)[2]
-        pose = values["pose"]
         joined = schedule.spline()
-        at_samples = joined @ pose
+        pose = joined @ values["pose"]
         moved = tuple(
             FingerSeed(f.base, f.lengths, f.frames, f.axes, values[f"angles{c}"], f.tips)
             for c, f in zip(self.contacts, fingers, strict=True)
@@ -225,12 +222,11 @@ class WholeHandStage:
         return WholeHand(
             fingers=moved,
             contacts=self.contacts,
-            pose=pose,
             angles=tuple(joined @ f.angles for f in moved),
             palm_position=position,
             palm_quaternion=orientation,
-            position=at_samples[:, :3],
-            vector=at_samples[:, 3:],
+            position=pose[:, :3],
+            vector=pose[:, 3:],
             point=point,
             force=values["force"].reshape(-1, contacts, 3) * active[:, :, None],
             active=active,

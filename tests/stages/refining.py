@@ -37,7 +37,6 @@ class MadeUp:
         self.start = WholeHand(
             fingers=tuple(made_up_finger(model, n, 2, seed=n) for n in (1, 2)),
             contacts=contacts,
-            pose=np.zeros((len(model.schedule.keyframes), 6)),
             angles=tuple(rng.uniform(-0.8, 0.8, (count, n)) for n in (1, 2)),
             palm_position=model.palm_position,
             palm_quaternion=model.palm_quaternion,

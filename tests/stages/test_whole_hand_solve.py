@@ -59,7 +59,7 @@ def test_goals_are_kept(solved: Solved) -> None:
 
 def test_samples_are_the_splines_of_keyframes(solved: Solved) -> None:
     schedule, result = solved.model.schedule, solved.result
-    poses = spline_at(schedule.keyframes, result.pose, schedule.samples)
+    poses = spline_at(schedule.keyframes, result.solution.values["pose"], schedule.samples)
     np.testing.assert_allclose(np.hstack([result.position, result.vector]), poses, atol=1e-12)
     at_keyframes = [int(np.argmin(np.abs(schedule.samples - time))) for time in schedule.keyframes]
     for angles, finger in zip(result.angles, result.fingers, strict=True):
@@ -80,7 +80,7 @@ def test_contacts_touch_both_surfaces(solved: Solved) -> None:
 
 def test_forces_balance(solved: Solved) -> None:
     model, result = solved.model, solved.result
-    motion = Motion(model, result.pose)
+    motion = Motion(model, result.solution.values["pose"])
     acceleration = motion.acceleration * model.units.length / 9.81
     for s, turn in enumerate(motion.at(0)[1]):
         residual = turn.apply(result.force[s].sum(axis=0)) - [0, 0, 1] - acceleration[s]
