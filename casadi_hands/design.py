@@ -79,7 +79,7 @@ class Hand:
 
 @dataclass(frozen=True)
 class Motion:
-    """The arrays of ``motion.npz``: same names, shapes, units and frames (see the README)."""
+    """The arrays of ``motion.npz``: same names, shapes, units and frames (see ``docs/result-folder.md``)."""
 
     time: np.ndarray
     object_position: np.ndarray

@@ -17,8 +17,8 @@ STOPPED = 130
 def leave_on_interrupt(last_words: Callable[[], None]) -> Iterator[None]:
     """End the program, and the processes it started, as soon as the user asks for it.
 
-    A KeyboardInterrupt would not do: CasADi swallows it while IPOPT runs, and the pipeline goes on with what the
-    interrupted solver returned.
+    A KeyboardInterrupt would be late: on its way out it waits for what other processes are at. It is left to programs
+    that use the package (`Solver.solve` raises what CasADi swallows while IPOPT runs).
 
     Args:
         last_words: called before the end.
@@ -30,7 +30,7 @@ def leave_on_interrupt(last_words: Callable[[], None]) -> Iterator[None]:
         for child in multiprocessing.active_children():
             child.terminate()
         last_words()
-        # An exception would be swallowed like the other one.
+        # An exception would not leave IPOPT as itself, and would wait like the other one.
         os._exit(STOPPED)
 
     # Leaving at once leaves semaphores to Python's resource tracker, which clears them away, but complains.

@@ -17,7 +17,7 @@ class _Limit:
 
     Attributes:
         cannot: continues ``finger 'x' cannot ...``.
-        unit: of the violation: ``length``, ``force``, ``torque``, or none that a reader would know.
+        unit: of the violation: ``length``, ``force``, ``torque``, ``speed``, or none that a reader would know.
         advice: what to try.
         explains: figures of the audit that follow.
     """

@@ -40,7 +40,7 @@ def path_between(points: Sequence[SX], normals: Sequence[SX], rotations: Sequenc
         rotations: (3, 3) each, of the body.
     """
     chord, bend = points[1] - points[0], normals[1] - normals[0]
-    # asin(s)/s - 1 by its series, over 4 s², s half the normals' difference.
+    # Along the bend the chord is stretched by asin(u)/u, u half the bend's length; a series of asin(u)/u - 1 in s = u².
     s = ca.sumsqr(bend) / 4
     arc = chord + (1 / 6 + s * (3 / 40 + s * (5 / 112 + s * 35 / 1152))) / 4 * ca.dot(chord, bend) * bend
     # The mean of two rotations is short of a rotation; a step of Newton's towards the nearest one.
