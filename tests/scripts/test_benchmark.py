@@ -21,6 +21,7 @@ from casadi_hands.stages.floating import FloatingStage
 from casadi_hands.stages.model import build_model
 
 TASK = Path(__file__).parents[2] / "problems" / "horizontal_translation.yaml"
+NAP = 60  # s
 
 
 def attempt(*trace: tuple[float, float]) -> Attempt:
@@ -117,7 +118,7 @@ def test_a_call_of_its_own_process_returns_fails_or_is_stopped() -> None:
     assert isolated(os._exit, 3, limit=60).failure == "the process died"
     slow = isolated(_wait, limit=0.5)
     assert slow.failure == "stopped after 0.5 s"
-    assert slow.seconds < 20
+    assert slow.seconds < NAP
 
 
 def _allocate(megabytes: int) -> int:
@@ -126,9 +127,7 @@ def _allocate(megabytes: int) -> int:
 
 
 def _wait() -> None:
-    import time
-
-    time.sleep(60)
+    time.sleep(NAP)
 
 
 def spin(pipe: Connection) -> None:
@@ -150,7 +149,9 @@ def test_processor_time_is_what_children_have_used() -> None:
         used = sum(ours.recv() for ours, _ in pipes)
         got, waited = processor_time()
         assert got == pytest.approx(used, abs=0.1)
-        assert 0 <= waited < 2 * (time.perf_counter() - began)
+        # No thread waits for longer than it is there.
+        threads = sum(len(list(Path(f"/proc/{child.pid}/task").iterdir())) for child in children)
+        assert 0 <= waited < threads * (time.perf_counter() - began)
     finally:
         for ours, _ in pipes:
             ours.send(None)
