@@ -79,6 +79,18 @@ def farthest_from_the_triangle(motion: Motion) -> float:
 
 
 @pytest.mark.slow
+def test_a_sphere_is_turned_half_round_either_way_without_letting_go(tmp_path: Path) -> None:
+    rolls_half_round(certified("sphere_rotation", tmp_path))
+
+
+def rolls_half_round(motion: Motion) -> None:
+    assert motion.contact_active.all()
+    turned = Rotation.from_quat(motion.object_orientation, scalar_first=True)
+    about_z = np.unwrap(turned.as_rotvec()[:, 2])
+    assert np.degrees([about_z.max(), about_z.min()]) == pytest.approx([180, -180], abs=0.6)
+
+
+@pytest.mark.slow
 def test_the_top_finger_acts_only_against_the_push_towards_the_palm() -> None:
     task = load_task(PROBLEMS / "sphere_rotation_and_translation.yaml")
     pushed, free = (planned(each) for each in (task, task.model_copy(update={"perturbations": []})))
