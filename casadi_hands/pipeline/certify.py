@@ -12,7 +12,7 @@ from casadi_hands.design import Design
 from casadi_hands.errors import HandsError
 from casadi_hands.pipeline.judge import Judge
 from casadi_hands.pipeline.record import Record
-from casadi_hands.pipeline.refinement import failing_fingers, refined_reason
+from casadi_hands.pipeline.refine_reason import failing_fingers, refined_reason
 from casadi_hands.pipeline.steps import adopt, run_search, run_shortened, run_whole_hand
 from casadi_hands.reasons import Reason
 from casadi_hands.search.algorithm import Candidate, Found, Search, run_record

@@ -9,7 +9,7 @@ from numpy.polynomial.legendre import leggauss
 from casadi_hands.geometry import point_disc_distance
 from casadi_hands.motion import conjugate, multiply, rotation_matrix
 from casadi_hands.nlp import Kernel
-from casadi_hands.stages.kernels import placed
+from casadi_hands.stages.soft_object import placed
 from casadi_hands.stages.surface import path_between, smooth_surface
 
 # Gauss and Legendre's points and weights, for a step from 0 to 1.

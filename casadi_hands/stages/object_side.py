@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from casadi_hands.motion import eased, linear
 from casadi_hands.nlp import Problem, Rows
-from casadi_hands.stages import kernels
+from casadi_hands.stages import soft_object
 from casadi_hands.stages.model import Model
 
 Array = NDArray[np.float64]
@@ -117,14 +117,14 @@ def _bind_scenario(problem: Problem, model: Model, side: ObjectSide, force: Rows
     else:
         external = [p["nothing"], p["nothing"]]
     common = [p["reference"], p["step"], p["gravity"], *external, p["inertia"], p["inertial"]]
-    kernel = kernels.dynamics(contacts, suffix, regularise=not suffix)
+    kernel = soft_object.dynamics(contacts, suffix, regularise=not suffix)
     problem.bind(kernel, [*side.pose, side.point[1], force, side.activity], common)
     capsules = problem.parameter(f"capsules{suffix}", (model.contacts, 7))
     for i in range(model.contacts):
         span = (3 * i, 3 * i + 3)
         rows = [force.entries(*span), side.activity.entries(i, i + 1), side.point[1].entries(*span)]
         parameters = [capsules[i : i + 1], p["friction"], p["sharpness"], p["step"]]
-        named = kernels.contact_forces(suffix, str(i))
+        named = soft_object.contact_forces(suffix, str(i))
         problem.bind(named, [*rows, side.point[0].entries(*span)], parameters, {"in_cone": (0, np.inf)})
     if model.ground is not None:
         i, span = contacts - 1, (3 * contacts - 3, 3 * contacts)
@@ -133,32 +133,32 @@ def _bind_scenario(problem: Problem, model: Model, side: ObjectSide, force: Rows
         capsule = problem.parameter(f"ground_capsule{suffix}", (1, 7))
         friction = problem.parameter(f"ground_friction{suffix}", (1, 1))
         parameters = [p["reference"], capsule, p["ground_height"], friction, p["sharpness"], p["step"]]
-        problem.bind(kernels.ground_contact(suffix), rows, parameters, {"in_cone": (0, np.inf)})
+        problem.bind(soft_object.ground_contact(suffix), rows, parameters, {"in_cone": (0, np.inf)})
 
 
 def _bind_points(problem: Problem, model: Model, side: ObjectSide) -> None:
     p, contacts = problem.parameters, sizes(model)[2]
     patches = problem.parameter("patches", (sizes(model)[1], 3 * contacts))
-    kernel = kernels.contact_motion()
+    kernel = soft_object.contact_motion()
     for i in range(contacts):
         rows = [points.entries(3 * i, 3 * i + 3) for points in side.point]
         problem.bind(kernel, rows, [patches[:, 3 * i : 3 * i + 3], p["step"]])
     least = min(2, model.contacts)
-    problem.bind(kernels.enough_contacts(contacts), [side.keyframe_activity], [], {"sum": (least, np.inf)})
+    problem.bind(soft_object.enough_contacts(contacts), [side.keyframe_activity], [], {"sum": (least, np.inf)})
 
 
 def _bind_goals(problem: Problem, model: Model, side: ObjectSide) -> None:
     p = problem.parameters
     if model.tool is not None:
         targets, tool = problem.parameter("targets", (sizes(model)[1], 3)), problem.parameter("tool", (1, 3))
-        problem.bind(kernels.goal_point(), [side.pose[1]], [p["reference"], targets, tool])
+        problem.bind(soft_object.goal_point(), [side.pose[1]], [p["reference"], targets, tool])
     else:
         shape = model.goal_positions.shape
         targets, vectors = problem.parameter("targets", shape), problem.parameter("vectors", shape)
         rows = side.keyframe_pose.take(model.schedule.goals)
-        problem.bind(kernels.goal_pose(), [rows], [p["reference"], targets, vectors])
+        problem.bind(soft_object.goal_pose(), [rows], [p["reference"], targets, vectors])
     straight = problem.parameter("straight", (sizes(model)[0], 6))
-    problem.bind(kernels.straight_path(), [side.keyframe_pose], [straight])
+    problem.bind(soft_object.straight_path(), [side.keyframe_pose], [straight])
 
 
 def _bind_clearance(problem: Problem, model: Model, side: ObjectSide, palm: Rows | None) -> None:
@@ -166,7 +166,7 @@ def _bind_clearance(problem: Problem, model: Model, side: ObjectSide, palm: Rows
     given = [problem.parameter(f"palm_{n}", (samples, k)) for n, k in (("position", 3), ("quaternion", 4))]
     radius = problem.parameter("palm_radius", (1, 1))
     primitives = problem.parameter("primitives", (len(model.primitives), 7))
-    kernel = kernels.palm_clearance(moves=palm is not None)
+    kernel = soft_object.palm_clearance(moves=palm is not None)
     rows = [side.pose[1]] if palm is None else [side.pose[1], palm.combine(model.schedule.spline())]
     for i in range(len(model.primitives)):
         parameters = [*given, p["reference"], primitives[i : i + 1], radius, p["ground_height"], p["clearance"]]

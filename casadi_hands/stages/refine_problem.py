@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from casadi_hands.nlp import Kernel, Problem, Rows
-from casadi_hands.stages import exact_kernels as finger
+from casadi_hands.stages import exact_fingers as finger
 from casadi_hands.stages import exact_object as body
 from casadi_hands.stages.model import Model
 from casadi_hands.stages.object_side import GOAL_TOLERANCE, MOST_FORCE

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from casadi_hands.nlp import Options, Problem, Rows, Solution, Solver
-from casadi_hands.stages import hand_kernels as kernels
+from casadi_hands.stages import soft_fingers
 from casadi_hands.stages.finger_numbers import contact_kinematics
 from casadi_hands.stages.floating import Floating
 from casadi_hands.stages.grasp import inward_normals, on_capsules
@@ -107,24 +107,24 @@ class WholeHandStage:
             rows = [side.pose[1], side.pose[0], side.point[1].entries(*span), side.force.entries(*span)]
             rows += [side.activity.entries(c, c + 1), now, angles[c].combine(at[-1]), *palms]
             tail = [p["reference"], p["link_radius"], p["friction"], p["sharpness"], p["step"]]
-            problem.bind(kernels.touch(n, palm_moves), rows, [*given, *before, *shape, *tail])
+            problem.bind(soft_fingers.touch(n, palm_moves), rows, [*given, *before, *shape, *tail])
             three = [angles[c].combine(at[offset]) for offset in (-1, 0, 1)]
-            problem.bind(kernels.move(n), three, [*shape, p["lowest"], p["highest"], p["step"]])
+            problem.bind(soft_fingers.move(n), three, [*shape, p["lowest"], p["highest"], p["step"]])
             tail = [
                 p[name]
                 for name in ("reference", "link_radius", "palm_radius", "ground_height", "margin", "all_primitives")
             ]
-            kernel = kernels.object_clearance(n, len(model.primitives), palm_moves)
+            kernel = soft_fingers.object_clearance(n, len(model.primitives), palm_moves)
             problem.bind(kernel, [side.pose[1], now, *palms[:1]], [*given, *shape, *tail])
             for d, m in zip(contacts[:i], joints[:i], strict=True):
-                kernel = kernels.finger_clearance(n, m)
+                kernel = soft_fingers.finger_clearance(n, m)
                 both = [*shape, *self._morphology(d)]
                 problem.bind(kernel, [now, angles[d].combine(at[0])], [*both, p["link_radius"], p["margin"]])
         if palm is not None:
             inner = np.arange(keyframes)
             three = [palm.take(np.clip(inner + offset, 0, keyframes - 1)) for offset in (-1, 0, 1)]
             problem.parameter("keyframe_step", (1, 1))
-            problem.bind(kernels.palm_motion(), three, [p["keyframe_step"]])
+            problem.bind(soft_fingers.palm_motion(), three, [p["keyframe_step"]])
         self.solver = Solver(problem)
 
     def _declare_morphology(self, contact: int, joints: int) -> None:

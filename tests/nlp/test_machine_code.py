@@ -22,8 +22,8 @@ from casadi import SX, Function
 from casadi_hands.nlp import Kernel, machine_code
 from casadi_hands.nlp.assembly import kernel_functions
 from casadi_hands.nlp.machine_code import cache_folder, compiled, compiler
-from casadi_hands.stages import exact_kernels
-from casadi_hands.stages.kernels import dynamics
+from casadi_hands.stages import exact_fingers
+from casadi_hands.stages.soft_object import dynamics
 
 Array = np.ndarray
 ROOT = Path(__file__).parents[2]
@@ -98,9 +98,9 @@ def suffixes(cache: Path) -> list[str]:
 def kernels() -> list[Kernel]:
     return [
         dynamics(2),
-        exact_kernels.contact(2, 0, True),
-        exact_kernels.rolling(1, 1),
-        exact_kernels.fingers_apart(1, 2, "a"),
+        exact_fingers.contact(2, 0, True),
+        exact_fingers.rolling(1, 1),
+        exact_fingers.fingers_apart(1, 2, "a"),
     ]
 
 

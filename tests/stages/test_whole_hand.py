@@ -26,9 +26,9 @@ from tests.stages.example import (
     torques,
     unsupplied,
 )
-from tests.stages.test_kernels import ALL_TERMS, WEIGHT_OF
-from tests.stages.test_kernels import Witness as ObjectWitness
 from tests.stages.test_model import rotations
+from tests.stages.test_soft_object import ALL_TERMS, WEIGHT_OF
+from tests.stages.test_soft_object import Witness as ObjectWitness
 
 Array = np.ndarray
 MARGIN = 0.03

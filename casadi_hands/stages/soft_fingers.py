@@ -1,4 +1,4 @@
-"""The blocks of the hand's side in the whole-hand stage: one finger at one sample, and pairs of bodies."""
+"""The fingers' blocks of the whole-hand stage, one finger or two at one sample, and the palm's; all are costs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from casadi_hands.geometry import penalty_spline, project_to_capsule
 from casadi_hands.motion import rotation_matrix
 from casadi_hands.nlp import Kernel
 from casadi_hands.stages.finger_symbols import FingerSymbols, PlacedFinger, morphology
-from casadi_hands.stages.kernels import Palm, placed
+from casadi_hands.stages.soft_object import Palm, placed
 from casadi_hands.terms import clearance, contact, finger
 
 ROUNDING = 1e-3

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from casadi_hands.stages import exact_kernels as kernels
+from casadi_hands.stages import exact_fingers
 from casadi_hands.stages.synthesis import FingerSeed
 from tests.stages.blocks import (
     STEP,
@@ -76,7 +76,7 @@ class Contact:
 def test_a_contact_s_numbers_are_those_of_numpy_and_pinocchio(joints: int, seed: int) -> None:
     case = Contact(joints, seed)
     finger, place, normal, force = case.finger, case.place, case.normal, case.force
-    found = numbers(kernels.contact(joints, 0, limited=True), *case.contact)
+    found = numbers(exact_fingers.contact(joints, 0, limited=True), *case.contact)
     chain, link = PinFinger(finger).chain(finger.angles[0])
     on_link = link.T @ (place.in_palm(case.point) - chain[-2])
     # Kinks of capsules are rounded by a thousandth of their length.
@@ -123,7 +123,7 @@ def test_surfaces_touch_where_normals_are_opposed(joints: int, share: float, out
     case.place.vector = (turn * case.place.reference.inv()).as_rotvec()
     touched = case.place.palm.apply(on_axis + case.radius * link_normal) + case.place.palm_position
     case.place.position = touched - turn.apply(case.point)
-    found = numbers(kernels.contact(joints, 0, limited=True), *case.contact)
+    found = numbers(exact_fingers.contact(joints, 0, limited=True), *case.contact)
     np.testing.assert_allclose(found["on_object"], 0, atol=1e-5)
     # From within the object, the link's axis is a diameter away from where it should be.
     off = found["on_link"]
@@ -133,25 +133,25 @@ def test_surfaces_touch_where_normals_are_opposed(joints: int, share: float, out
 @pytest.mark.parametrize("joints", [1, 2, 3])
 def test_a_second_force_is_held_as_the_first(joints: int) -> None:
     case = Contact(joints, 7)
-    first = numbers(kernels.contact(joints, 0, limited=True), *case.contact)
-    second = numbers(kernels.held(joints, 0, limited=True), *case.held)
+    first = numbers(exact_fingers.contact(joints, 0, limited=True), *case.contact)
+    second = numbers(exact_fingers.held(joints, 0, limited=True), *case.held)
     assert set(second) == {"pressing", "cone", "passive", "torque", "passive_force"}
     for name, value in second.items():
         np.testing.assert_allclose(value, first[name], rtol=1e-12, atol=1e-12)
     # Turned about the normal, the force is as well within the cone; doubled, four times as far from its edge.
     turn = Rotation.from_rotvec(1.1 * case.normal)
     case.force = 2 * turn.apply(case.force)
-    other = numbers(kernels.held(joints, 0, limited=True), *case.held)
+    other = numbers(exact_fingers.held(joints, 0, limited=True), *case.held)
     np.testing.assert_allclose(other["pressing"], 2 * second["pressing"], rtol=1e-3)
     np.testing.assert_allclose(other["cone"], 4 * second["cone"], rtol=1e-2)
 
 
 def test_torque_is_a_constraint_only_where_it_is_limited() -> None:
-    assert "torque" in kernels.contact(2, 0, limited=True).constraints
-    assert "torque" not in kernels.contact(2, 0, limited=False).constraints
-    assert "torque" not in kernels.held(2, 0, limited=False).constraints
-    assert "speed" in kernels.joint_motion(2, 0, limited=True).constraints
-    assert "speed" not in kernels.joint_motion(2, 0, limited=False).constraints
+    assert "torque" in exact_fingers.contact(2, 0, limited=True).constraints
+    assert "torque" not in exact_fingers.contact(2, 0, limited=False).constraints
+    assert "torque" not in exact_fingers.held(2, 0, limited=False).constraints
+    assert "speed" in exact_fingers.joint_motion(2, 0, limited=True).constraints
+    assert "speed" not in exact_fingers.joint_motion(2, 0, limited=False).constraints
 
 
 # Rolling.
@@ -172,7 +172,7 @@ Knot = tuple[Array, Rotation, Array, float]
 
 def rolls(before: Knot, after: Knot) -> dict[str, Array]:
     """The rolling block of a ball at (position, orientation, contact in the palm frame, finger's angle) twice."""
-    return numbers(kernels.rolling(1, 0), *rolling_block(before, after))
+    return numbers(exact_fingers.rolling(1, 0), *rolling_block(before, after))
 
 
 def rolling_block(before: Knot, after: Knot) -> Block:
@@ -268,7 +268,7 @@ def test_clearances_of_a_finger_are_those_of_coal(touched: int | None, grounded:
         rng = np.random.default_rng(seed)
         finger, place = random_finger(joints, rng), Place(rng)
         primitives = np.hstack([rng.normal(size=(2, 6)), [[0.2], [0.3]]])
-        kernel = kernels.apart(joints, 2, 0, touched, grounded)
+        kernel = exact_fingers.apart(joints, 2, 0, touched, grounded)
         found = numbers(kernel, *clearance_block(finger, place, primitives))["clear"]
         links = PinFinger(finger).links(finger.angles[0])
         expected = [palm_apart(links[0][1], PALM_RADIUS) - RADIUS]
@@ -292,7 +292,7 @@ def test_clearances_of_two_fingers_are_those_of_coal() -> None:
     for seed in range(5):
         rng = np.random.default_rng(seed)
         one, other = random_finger(2, rng), random_finger(3, rng)
-        found = numbers(kernels.fingers_apart(2, 3, "0_1"), *pair_block(one, other))["clear"]
+        found = numbers(exact_fingers.fingers_apart(2, 3, "0_1"), *pair_block(one, other))["clear"]
         links = [PinFinger(f).links(f.angles[0]) for f in (one, other)]
         expected = [between(a, b, 0.2) for a, b in itertools.product(*links)]
         np.testing.assert_allclose(found, expected, atol=6e-3)
@@ -306,13 +306,13 @@ def test_smoothness_and_staying() -> None:
     rng = np.random.default_rng(0)
     angles = rng.normal(size=(3, 2))
     found = numbers(
-        kernels.joint_motion(2, 0, limited=True), {f"angles{i}": angles[i] for i in range(3)}, {"step": STEP}
+        exact_fingers.joint_motion(2, 0, limited=True), {f"angles{i}": angles[i] for i in range(3)}, {"step": STEP}
     )
     speeds = np.diff(angles, axis=0) / STEP
     np.testing.assert_allclose(found["speed"], speeds.ravel(), rtol=1e-12)
     np.testing.assert_allclose(found["joint_acceleration"], ((np.diff(speeds, axis=0) / STEP) ** 2).sum(), rtol=1e-9)
     finger, other = random_finger(2, rng), random_finger(2, rng)
-    found = numbers(kernels.stay(2, 0), shape(finger), shape(other))
+    found = numbers(exact_fingers.stay(2, 0), shape(finger), shape(other))
     apart = [finger.base - other.base, finger.lengths - other.lengths, finger.axes - other.axes]
     np.testing.assert_allclose(found["stay_design"], sum((a**2).sum() for a in apart), rtol=1e-12)
     np.testing.assert_allclose(found["on_palm"], finger.base @ finger.base, rtol=1e-12)
@@ -328,13 +328,13 @@ def test_derivatives_agree_with_differences() -> None:
     primitives = np.hstack([rng.normal(size=(2, 6)), [[0.2], [0.3]]])
     angles = rng.normal(size=(3, 2))
     for kernel, (variables, parameters) in (
-        (kernels.contact(2, 0, limited=True), case.contact),
-        (kernels.held(2, 0, limited=True), case.held),
-        (kernels.rolling(1, 0), rolling_block(before, after)),
-        (kernels.apart(2, 2, 0, 1, grounded=True), clearance_block(one, place, primitives)),
-        (kernels.fingers_apart(2, 3, "0_1"), pair_block(one, other)),
-        (kernels.joint_motion(2, 0, limited=True), ({f"angles{i}": angles[i] for i in range(3)}, {"step": STEP})),
-        (kernels.stay(2, 0), (shape(one), shape(random_finger(2, rng)))),
+        (exact_fingers.contact(2, 0, limited=True), case.contact),
+        (exact_fingers.held(2, 0, limited=True), case.held),
+        (exact_fingers.rolling(1, 0), rolling_block(before, after)),
+        (exact_fingers.apart(2, 2, 0, 1, grounded=True), clearance_block(one, place, primitives)),
+        (exact_fingers.fingers_apart(2, 3, "0_1"), pair_block(one, other)),
+        (exact_fingers.joint_motion(2, 0, limited=True), ({f"angles{i}": angles[i] for i in range(3)}, {"step": STEP})),
+        (exact_fingers.stay(2, 0), (shape(one), shape(random_finger(2, rng)))),
     ):
         check_block(kernel, variables, parameters)
 
@@ -342,9 +342,9 @@ def test_derivatives_agree_with_differences() -> None:
 def test_derivatives_are_finite_where_nothing_moves_and_nothing_presses() -> None:
     # The object where its reference is, the finger straight up and on its seed axes, a contact with no force.
     knot = on_cap(0.3, 0.0)
-    check_block(kernels.rolling(1, 0), *rolling_block(knot, knot), h=1e-6)
+    check_block(exact_fingers.rolling(1, 0), *rolling_block(knot, knot), h=1e-6)
     case = Contact(2, 0)
     case.finger = replace(case.finger, axes=np.zeros((2, 2)), angles=np.zeros((1, 2)))
     case.place.vector, case.force = np.zeros(3), np.zeros(3)
-    check_block(kernels.contact(2, 0, limited=True), *case.contact, h=1e-6)
-    check_block(kernels.held(2, 0, limited=True), *case.held, h=1e-6)
+    check_block(exact_fingers.contact(2, 0, limited=True), *case.contact, h=1e-6)
+    check_block(exact_fingers.held(2, 0, limited=True), *case.held, h=1e-6)

@@ -11,8 +11,8 @@ from casadi_hands.geometry import norm
 from casadi_hands.motion import conjugate, rotation_matrix
 from casadi_hands.nlp import Kernel
 from casadi_hands.stages.finger_symbols import FingerSymbols, PlacedFinger, morphology
-from casadi_hands.stages.hand_kernels import distances
-from casadi_hands.stages.kernels import placed
+from casadi_hands.stages.soft_fingers import distances
+from casadi_hands.stages.soft_object import placed
 from casadi_hands.stages.surface import from_axis, path_between, smooth_surface, tangents
 from casadi_hands.terms import clearance, finger
 

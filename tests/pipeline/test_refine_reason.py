@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from casadi_hands.pipeline.refinement import failing_fingers, refined_reason
+from casadi_hands.pipeline.refine_reason import failing_fingers, refined_reason
 from casadi_hands.stages.model import Model, build_model
 from casadi_hands.stages.refine import Refined, Worst
 from casadi_hands.task import parse_task

@@ -1,4 +1,4 @@
-"""The blocks of the object's side, shared by the floating and the whole-hand stage."""
+"""The object's blocks of the floating and the whole-hand stage: physics, contacts, goals, clearance, most as costs."""
 
 from __future__ import annotations
 
