@@ -9,6 +9,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from casadi_hands.geometry import nearest_on_axis
 from casadi_hands.stages.model import Model
 
 Array = NDArray[np.float64]
@@ -27,22 +28,17 @@ def inward_normals(points: Array, capsules: Array) -> Array:
     """(C, 3) unit normals into the object at surface points (C, 3) of capsules (C, 7), object frame."""
     normals = []
     for point, capsule in zip(points, capsules, strict=True):
-        along = capsule[3:6] - capsule[:3]
-        squared = float(along @ along)
-        fraction = np.clip((point - capsule[:3]) @ along / squared, 0, 1) if squared else 0.0
-        outward = point - capsule[:3] - fraction * along
+        _, outward = nearest_on_axis(point, capsule)
         normals.append(-outward / max(float(np.linalg.norm(outward)), 1e-9))
     return np.array(normals)
 
 
 def on_capsules(points: Array, capsules: Array, inward: Array) -> Array:
     """Points (C, 3) moved along their normals onto capsules (C, 7), object frame."""
-    moved = []
-    for point, capsule, normal in zip(points, capsules, inward, strict=True):
-        along = capsule[3:6] - capsule[:3]
-        squared = float(along @ along)
-        fraction = np.clip((point - capsule[:3]) @ along / squared, 0, 1) if squared else 0.0
-        moved.append(capsule[:3] + fraction * along - capsule[6] * normal)
+    moved = [
+        nearest_on_axis(point, capsule)[0] - capsule[6] * normal
+        for point, capsule, normal in zip(points, capsules, inward, strict=True)
+    ]
     return np.array(moved)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from casadi_hands.geometry import nearest_on_axis
 from casadi_hands.motion import Schedule, eased, held, linear
 from casadi_hands.task import Task
 
@@ -266,10 +267,7 @@ def _nearest_primitive(point: Array, primitives: Array) -> Array:
     """The primitive (7,) whose surface is nearest to a point."""
 
     def distance(primitive: Array) -> float:
-        start, along = primitive[:3], primitive[3:6] - primitive[:3]
-        squared = float(along @ along)
-        fraction = np.clip((point - start) @ along / squared, 0, 1) if squared else 0.0
-        return abs(float(np.linalg.norm(point - start - fraction * along)) - float(primitive[6]))
+        return abs(float(np.linalg.norm(nearest_on_axis(point, primitive)[1])) - float(primitive[6]))
 
     return np.asarray(min(primitives, key=distance))
 

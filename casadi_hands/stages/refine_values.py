@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from casadi_hands.geometry import nearest_on_axis
 from casadi_hands.stages.model import Model
 from casadi_hands.stages.object_side import MOST_FORCE, MOST_TURN, tool_path
 from casadi_hands.stages.refine_problem import RefineProblem
@@ -181,8 +182,8 @@ def _helpers(points: Array, capsule: Array) -> Array:
     helper = along / np.linalg.norm(along) if np.linalg.norm(along) > 1e-9 else np.eye(3)[0]
     helpers = []
     for point in points:
-        normal = point - capsule[:3] - np.clip((point - capsule[:3]) @ along / max(along @ along, 1e-12), 0, 1) * along
-        normal /= np.linalg.norm(normal)
+        _, normal = nearest_on_axis(point, capsule)
+        normal = normal / np.linalg.norm(normal)
         across = helper - (helper @ normal) * normal
         if np.linalg.norm(across) < 0.5:
             across = np.eye(3)[np.argmin(np.abs(normal))]

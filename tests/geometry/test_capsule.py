@@ -5,7 +5,7 @@ import coal
 import numpy as np
 import pytest
 
-from casadi_hands.geometry import closest_on_segment, project_to_capsule
+from casadi_hands.geometry import closest_on_segment, nearest_on_axis, project_to_capsule
 
 RANDOM = np.random.default_rng(3)
 
@@ -78,6 +78,16 @@ def test_closest_point_of_a_segment() -> None:
     for point, expected in (([5, 1, 0], [1, 1, 0]), ([0, -3, 1], [1, 0, 0]), ([0, 9, 1], [1, 4, 0])):
         got = closest_on_segment(ca.DM(point), ca.DM(start), ca.DM(end))
         np.testing.assert_allclose(np.asarray(got).ravel(), expected, atol=3e-5)
+        nearest, way = nearest_on_axis(np.array(point, float), np.r_[start, end, 0.5])
+        np.testing.assert_allclose(nearest, expected, atol=1e-12)
+        np.testing.assert_allclose(way, np.subtract(point, expected), atol=1e-12)
+
+
+def test_nearest_point_of_an_axis_of_no_length_is_the_centre() -> None:
+    center, point = np.array([1.0, -2, 0.5]), np.array([1.0, 1, 0.5])
+    nearest, way = nearest_on_axis(point, np.r_[center, center, 0.5])
+    np.testing.assert_array_equal(nearest, center)
+    np.testing.assert_array_equal(way, [0, 3, 0])
 
 
 def test_normal_bends_smoothly_where_cap_meets_cylinder() -> None:
