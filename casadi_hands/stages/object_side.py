@@ -14,7 +14,7 @@ from casadi_hands.stages import soft_object
 from casadi_hands.stages.model import Model
 
 Array = NDArray[np.float64]
-CLEARANCE = 0.02  # of object and palm, half extents
+CLEARANCE = 0.02  # half extents, asked of object and palm, and in exact motions of all bodies that do not touch
 GOAL_TOLERANCE = 5e-4  # half extents and rad, each coordinate: the task's cost alone gives way to slow accelerations
 MOST_FORCE = 20.0  # m·g, a bound on each component of a contact force
 MOST_TURN = 5.6  # rad, up to where the exponential map's coordinates are used

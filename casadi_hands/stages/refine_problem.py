@@ -12,11 +12,10 @@ from casadi_hands.nlp import Kernel, Problem, Rows
 from casadi_hands.stages import exact_fingers as finger
 from casadi_hands.stages import exact_object as body
 from casadi_hands.stages.model import Model
-from casadi_hands.stages.object_side import GOAL_TOLERANCE, MOST_FORCE
+from casadi_hands.stages.object_side import CLEARANCE, GOAL_TOLERANCE, MOST_FORCE
 from casadi_hands.stages.synthesis import AXIS_RANGE
 
 JOINT_MARGIN = 0.005  # rad, so that a smooth curve through the knots stays within the limits between them
-CLEARANCE = 0.02  # half extents, asked of bodies that do not touch
 _FREE = (-np.inf, np.inf)
 _HELD = {"pressing": (0.0, np.inf), "cone": (0.0, np.inf)}
 

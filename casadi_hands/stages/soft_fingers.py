@@ -5,14 +5,12 @@ from __future__ import annotations
 import casadi as ca
 from casadi import SX
 
-from casadi_hands.geometry import penalty_spline, project_to_capsule
+from casadi_hands.geometry import project_to_capsule
 from casadi_hands.motion import rotation_matrix
 from casadi_hands.nlp import Kernel
 from casadi_hands.stages.finger_symbols import FingerSymbols, PlacedFinger, morphology
 from casadi_hands.stages.soft_object import Palm, placed
 from casadi_hands.terms import clearance, contact, finger
-
-ROUNDING = 1e-3
 
 
 def given_morphology(kernel: Kernel, joints: int, tag: str = "") -> FingerSymbols:
@@ -87,8 +85,7 @@ def object_clearance(joints: int, primitives: int, moves: bool) -> Kernel:
     here = symbols.placed(angles)
     up = palm.turned(SX([0, 0, 1]))
     apart, touching = distances(here, radius, palm_radius, in_palm, up, ground - palm.position[2])
-    overlaps = ca.vertcat(margin - apart, -touching)
-    kernel.cost("collision", penalty_spline(overlaps, ROUNDING), "sum")
+    kernel.cost("collision", clearance.overlap(ca.vertcat(margin - apart, -touching)), "sum")
     return kernel
 
 
@@ -115,7 +112,7 @@ def finger_clearance(joints: int, other_joints: int) -> Kernel:
     first, second = given_morphology(kernel, joints, "_a"), given_morphology(kernel, other_joints, "_b")
     radius, margin = kernel.parameter("radius"), kernel.parameter("margin")
     apart = clearance.links_and_links(first.placed(angles).ends, second.placed(other_angles).ends, radius)
-    kernel.cost("collision", penalty_spline(margin - apart, ROUNDING), "sum")
+    kernel.cost("collision", clearance.overlap(margin - apart), "sum")
     return kernel
 
 

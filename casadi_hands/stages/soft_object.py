@@ -5,12 +5,10 @@ from __future__ import annotations
 import casadi as ca
 from casadi import SX
 
-from casadi_hands.geometry import penalty_spline, point_disc_distance
+from casadi_hands.geometry import point_disc_distance
 from casadi_hands.motion import angular_motion, conjugate, exponential, multiply, rotation_matrix
 from casadi_hands.nlp import Kernel
-from casadi_hands.terms import body, contact
-
-CLEARANCE_ROUNDING = 1e-3  # half-width of the collision spline's transition, object half extents
+from casadi_hands.terms import body, clearance, contact
 
 
 def placed(pose: SX, reference: SX) -> tuple[SX, SX]:
@@ -192,8 +190,8 @@ def palm_clearance(moves: bool) -> Kernel:
     costs: list[SX] = []
     for point in (ends[0], (ends[0] + ends[1]) / 2, ends[1]):
         distance = point_disc_distance(palm.sees(point), palm_radius) - capsule[6]
-        costs.append(penalty_spline(margin - distance, CLEARANCE_ROUNDING))
-        costs.append(penalty_spline(ground - (point[2] - capsule[6]), CLEARANCE_ROUNDING))
+        costs.append(clearance.overlap(margin - distance))
+        costs.append(clearance.overlap(ground - (point[2] - capsule[6])))
     kernel.cost("palm_clearance", ca.vertcat(*costs), "sum")
     return kernel
 

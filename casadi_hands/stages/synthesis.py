@@ -9,7 +9,6 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from casadi_hands.geometry import penalty_spline
 from casadi_hands.motion import linear
 from casadi_hands.nlp import Kernel, Options, Problem, Rows, Solution, Solver
 from casadi_hands.stages.finger_symbols import morphology, tip_point
@@ -20,7 +19,6 @@ Array = NDArray[np.float64]
 OPTIONS = Options(max_iter=150, tol=1e-3, acceptable_tol=1e-2)
 BETWEEN = 2  # collision samples between neighbouring keyframes
 AXIS_RANGE = 2.2  # rad, how far an axis may turn from its seed
-ROUNDING = 1e-3
 MARGIN = 0.03  # clearance asked of bodies that need not touch, half extents
 LOOSE = 0.4  # how far the box bounds of angles and lengths are opened while annealing
 
@@ -290,8 +288,7 @@ def _collide(joints: int, primitives: int) -> Kernel:
     if joints > 1:
         apart.append(clearance.links_and_object(ends[:-1], radius, shapes))
     touching = clearance.links_and_object(ends[-1:], radius, shapes)
-    overlaps = ca.vertcat(margin - ca.vertcat(*apart), -touching)
-    kernel.cost("collision", penalty_spline(overlaps, ROUNDING), "sum")
+    kernel.cost("collision", clearance.overlap(ca.vertcat(margin - ca.vertcat(*apart), -touching)), "sum")
     return kernel
 
 
@@ -305,7 +302,7 @@ def _keep_apart(joints: int, other_joints: int) -> Kernel:
     other_angles = kernel.variable("angles_b", other_joints)
     radius, margin = kernel.parameter("radius"), kernel.parameter("margin")
     distances = clearance.links_and_links(first.placed(angles).ends, second.placed(other_angles).ends, radius)
-    kernel.cost("collision", penalty_spline(margin - distances, ROUNDING), "sum")
+    kernel.cost("collision", clearance.overlap(margin - distances), "sum")
     return kernel
 
 

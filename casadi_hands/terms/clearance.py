@@ -5,7 +5,14 @@ from __future__ import annotations
 import casadi as ca
 from casadi import SX
 
-from casadi_hands.geometry import point_disc_distance, segment_distance
+from casadi_hands.geometry import penalty_spline, point_disc_distance, segment_distance
+
+_ROUNDING = 1e-3  # half the width of the spline's transition, half extents
+
+
+def overlap(depth: SX) -> SX:
+    """The cost of how far bodies are into each other or the clearance asked of them, elementwise; plain values."""
+    return penalty_spline(depth, _ROUNDING)
 
 
 def links_and_object(ends: list[tuple[SX, SX]], radius: SX, primitives: SX) -> SX:

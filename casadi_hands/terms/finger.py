@@ -10,6 +10,7 @@ from casadi_hands.geometry import norm, penalty_spline
 # Of the Jacobian's singular values, lengths per rad: the lever below which a joint does not push.
 NULL_SPACE_DAMPING = 0.02
 _TORQUE_DAMPING = 1e-3  # λ of eq. A.5
+_ROUNDING = 1e-3  # half the width of the spline's transition, half extents or rad
 
 
 def null_space_force(jacobian: SX, force: SX, damping: float = NULL_SPACE_DAMPING) -> SX:
@@ -74,14 +75,14 @@ def solve_positive(matrix: SX, right: SX) -> SX:
     return x
 
 
-def beyond_limits(value: SX, lower: SX, upper: SX, rounding: float = 1e-3) -> SX:
+def beyond_limits(value: SX, lower: SX, upper: SX) -> SX:
     """g(value - upper) + g(lower - value), elementwise (eq. 2.22, 2.27); plain values."""
-    return penalty_spline(value - upper, rounding) + penalty_spline(lower - value, rounding)
+    return penalty_spline(value - upper, _ROUNDING) + penalty_spline(lower - value, _ROUNDING)
 
 
 def off_palm(base: SX, palm_radius: SX) -> SX:
     """How far a base (2,) on the palm's plane is beyond its rim, as g (eq. 2.25); a plain value."""
-    return penalty_spline(norm(base, 1e-6) - palm_radius, 1e-3)
+    return penalty_spline(norm(base, 1e-6) - palm_radius, _ROUNDING)
 
 
 def tip_acceleration(before: SX, now: SX, after: SX, step: SX) -> SX:

@@ -32,6 +32,13 @@ def coal_distance(a, b, other_a, other_b, radius: float, other_radius: float) ->
     return coal.distance(*shapes, coal.DistanceRequest(), coal.DistanceResult())
 
 
+def test_overlap_is_the_square_of_what_is_too_deep() -> None:
+    found = np.asarray(clearance.overlap(ca.DM([-0.5, -1e-3, 0.0, 0.1, 2.0]))).ravel()
+    # Half the transition, of 1e-3 to both sides, is left where bodies just touch.
+    np.testing.assert_allclose(found, [0, 0, 1e-6 / 6, 0.01, 4], atol=1e-6, rtol=1e-4)
+    assert found[2] == pytest.approx(1e-6 / 6)
+
+
 def test_links_and_object() -> None:
     found = np.asarray(clearance.links_and_object(links(JOINTS), ca.DM(RADIUS), ca.DM(PRIMITIVES.T))).ravel()
     expected = [
