@@ -190,8 +190,7 @@ def ground_contact() -> Kernel:
     kernel.constrain("on_surfaces", ca.vertcat(off_object, above))
     kernel.constrain("opposed", outward[:2])
     kernel.constrain("facing", outward[2])
-    kernel.constrain("pressing", exerted[2])
-    kernel.constrain("cone", (friction * exerted[2]) ** 2 - ca.sumsqr(exerted[:2]))
+    _hold(kernel, exerted, friction)
     kernel.cost("stay_point", point - wanted_point)
     kernel.cost("stay_force", force - wanted_force)
     return kernel
@@ -203,10 +202,14 @@ def ground_held() -> Kernel:
     pose, force = kernel.variable("pose", 6), kernel.variable("force", 3)
     reference, friction = kernel.parameter("reference", 4), kernel.parameter("friction")
     _, quaternion = placed(pose, reference)
-    exerted = ca.mtimes(rotation_matrix(quaternion), force)
+    _hold(kernel, ca.mtimes(rotation_matrix(quaternion), force), friction)
+    return kernel
+
+
+def _hold(kernel: Kernel, exerted: SX, friction: SX) -> None:
+    """Constrain the ground's force (3,) on the object, world: ``pressing`` (1) and ``cone`` (1: (μ f_n)² - f_t²)."""
     kernel.constrain("pressing", exerted[2])
     kernel.constrain("cone", (friction * exerted[2]) ** 2 - ca.sumsqr(exerted[:2]))
-    return kernel
 
 
 def ground_rolling() -> Kernel:
