@@ -176,17 +176,21 @@ def _merge(spheres: list[Capsule], cylinders: list[Cylinder]) -> tuple[list[Caps
     """Join each cylinder and its two end spheres into a capsule; keep what does not form one."""
     capsules: list[Capsule] = []
     bare: list[Cylinder] = []
-    ends: list[Capsule] = []
+    unused = spheres
     for cylinder in cylinders:
         center, half = cylinder.placement[:3, 3], 0.5 * cylinder.length * cylinder.placement[:3, 2]
-        caps = [_sphere_at(spheres, center + sign * half, cylinder.radius) for sign in (-1, 1)]
+        # Capsules that share an end may have a sphere each there, or one for all.
+        caps = [
+            _sphere_at(unused, center + sign * half, cylinder.radius)
+            or _sphere_at(spheres, center + sign * half, cylinder.radius)
+            for sign in (-1, 1)
+        ]
         if caps[0] is None or caps[1] is None:
             bare.append(cylinder)
             continue
-        ends += [cap for cap in caps if cap is not None]
+        unused = [sphere for sphere in unused if all(sphere is not cap for cap in caps)]
         capsules.append(Capsule(caps[0].start, caps[1].start, cylinder.radius))
-    alone = [sphere for sphere in spheres if all(sphere is not end for end in ends)]
-    return capsules + alone, bare
+    return capsules + unused, bare
 
 
 def _sphere_at(spheres: list[Capsule], center: np.ndarray, radius: float) -> Capsule | None:
