@@ -54,6 +54,11 @@ class Schedule:
         return np.searchsorted(self.samples, self.keyframes - 1e-9)
 
     @property
+    def goal_samples(self) -> NDArray[np.int64]:
+        """Index (G,) of the sample at each goal."""
+        return self.keyframe_samples[list(self.goals)]
+
+    @property
     def sample_keyframes(self) -> NDArray[np.int64]:
         """Index (S,) of the keyframe whose contact flags hold at each sample."""
         return held(self.keyframes, self.samples)

@@ -20,6 +20,7 @@ from casadi_hands.stages.continuation import Continuation
 from casadi_hands.stages.floating import Floating
 from casadi_hands.stages.model import Model
 from casadi_hands.stages.outcome import design_change
+from casadi_hands.stages.palm_motion import seen_from_palm
 from casadi_hands.stages.refine import Refined
 from casadi_hands.stages.refine_values import Margin
 from casadi_hands.stages.sampling import resampled, resampled_model, shortened
@@ -230,7 +231,9 @@ class Refiner:
 
 def _within_reach(model: Model) -> float:
     """The share of the way to its goals over which an object turns by less than fingers can go with it."""
-    turns = np.linalg.norm(model.goal_vectors - model.goal_vectors[0], axis=1)
+    goals = np.hstack([model.goal_positions, model.goal_vectors])
+    seen = seen_from_palm(model, goals, model.schedule.goal_samples)
+    turns = np.linalg.norm(seen[:, 3:] - seen[0, 3:], axis=1)
     return float(min(1.0, SURELY / max(turns.max(), 1e-9)))
 
 

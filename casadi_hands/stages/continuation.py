@@ -26,6 +26,7 @@ COARSE = 0.2  # s between coarse knots, at most
 SERVES = 0.1  # cost of slip and of forces that no joint supplies, of a start that is nearly exact
 LAST = SHORT_WAY[-1:]
 SHORTEST = 0.05  # of the way, by which a motion is lengthened at least
+LEAST = 0.1  # of the way, over which a first exact motion is looked for
 
 
 class Continuation:
@@ -107,15 +108,22 @@ class Continuation:
             The motion over the whole way, or the longest exact one that was found.
         """
         margin = margin or Margin()
-        begun = resampled(start, self.model, self.coarse.model)
+        model = self.coarse.model
+        begun = resampled(start, self.model, model)
+        still = at_rest(model, begun)
         refined = _named(f"{share:.0%} of the way,", self.coarse.take(LONG_WAY, begun, margin, share))
-        longest, before, step = refined, at_rest(refined.hand), max((1 - share) / 3, SHORTEST)
-        before_share, runs = 0.0, refined.runs
+        runs = refined.runs
+        while not refined.met and share / 2 >= LEAST:
+            share, begun = share / 2, extrapolated(model, still, begun, -0.5)
+            refined = _named(f"{share:.0%} of the way,", self.coarse.take(LONG_WAY, begun, margin, share))
+            runs += refined.runs
+        longest, before, step = refined, at_rest(model, refined.hand), max((1 - share) / 3, SHORTEST)
+        before_share = 0.0
         while longest.met and longest.share < 1 and step >= SHORTEST:
             share = longest.share + step
             share = 1.0 if share > 1 - SHORTEST / 2 else share
             by = (share - longest.share) / (longest.share - before_share)
-            farther = extrapolated(self.coarse.model, before, longest.hand, by)
+            farther = extrapolated(model, before, longest.hand, by)
             refined = _named(f"{share:.0%} of the way,", self.coarse.take(SHORT_WAY, farther, margin, share))
             runs += refined.runs
             if refined.met:

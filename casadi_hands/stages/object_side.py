@@ -12,6 +12,7 @@ from casadi_hands.motion import eased, linear
 from casadi_hands.nlp import Problem, Rows
 from casadi_hands.stages import soft_object
 from casadi_hands.stages.model import Model
+from casadi_hands.stages.palm_motion import carried_by_palm, seen_from_palm
 
 Array = NDArray[np.float64]
 CLEARANCE = 0.02  # half extents, asked of object and palm, and in exact motions of all bodies that do not touch
@@ -117,6 +118,8 @@ def _bind_scenario(problem: Problem, model: Model, side: ObjectSide, force: Rows
     else:
         external = [p["nothing"], p["nothing"]]
     common = [p["reference"], p["step"], p["gravity"], *external, p["inertia"], p["inertial"]]
+    if not suffix:
+        common.append(problem.parameter("carried_acceleration", (samples, 3)))
     kernel = soft_object.dynamics(contacts, suffix, regularise=not suffix)
     problem.bind(kernel, [*side.pose, side.point[1], force, side.activity], common)
     capsules = problem.parameter(f"capsules{suffix}", (model.contacts, 7))
@@ -187,9 +190,27 @@ def _between_goals(model: Model, times: Array) -> Array:
 
 
 def straight_path(model: Model) -> Array:
-    """Poses (N, 6) at the keyframes on the straight way between goals; a drawing's object stays upright."""
-    positions = model.goal_positions if model.tool is None else model.goal_positions - model.tool
-    return _between_goals(model, model.schedule.keyframes) @ np.hstack([positions, model.goal_vectors])
+    """Poses (N, 6) at the keyframes on the straight way between goals, as a palm that moves sees it.
+
+    A drawing's object stays upright, and its tool on the straight way in the world.
+    """
+    between, schedule = _between_goals(model, model.schedule.keyframes), model.schedule
+    if model.tool is not None:
+        return between @ np.hstack([model.goal_positions - model.tool, model.goal_vectors])
+    goals = np.hstack([model.goal_positions, model.goal_vectors])
+    seen = seen_from_palm(model, goals, schedule.goal_samples)
+    return carried_by_palm(model, between @ seen, schedule.keyframe_samples)
+
+
+def carried_acceleration(model: Model) -> Array:
+    """Acceleration (S, 3), lengths/s², at the samples, that the palm's motion gives an object it carries."""
+    count = len(model.schedule.samples)
+    if model.tool is not None:
+        return np.zeros((count, 3))
+    start = np.concatenate([model.goal_positions[0], model.goal_vectors[0]])
+    position = carried_by_palm(model, np.tile(start, (count, 1)), np.arange(count))[:, :3]
+    mirrored = np.vstack([position[1], position, position[-2]])  # as motions are at their ends
+    return np.diff(mirrored, 2, axis=0) / model.schedule.step**2
 
 
 def pose_bounds(model: Model) -> tuple[Array, Array]:
@@ -223,6 +244,7 @@ def object_parameters(model: Model) -> dict[str, Array | float]:
         "primitives": model.primitives,
         "targets": model.goal_positions,
         "straight": straight_path(model),
+        "carried_acceleration": carried_acceleration(model),
     }
     if model.tool is not None:
         values["tool"], values["targets"] = model.tool, tool_path(model)

@@ -197,7 +197,7 @@ class RefineProblem:
         self._bind(np.arange(self.knots), kernel, [self.pose], self._at(places), bounds)
         if model.tool is None:
             goals = problem.parameter("goals", (len(model.goal_positions), 6))
-            at = model.schedule.keyframe_samples[list(model.schedule.goals)]
+            at = model.schedule.goal_samples
             problem.bind(body.meet_goal(), [self.pose.take(at)], [goals])
         else:
             problem.parameter("tool", (1, 3))

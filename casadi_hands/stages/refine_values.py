@@ -75,7 +75,7 @@ class RefineValues:
             exact["ground_rolling.no_slip"] = (-slip, slip)
         if model.tool is not None:
             tolerance = np.full((self.knots, 3), TOOL_TOLERANCE)
-            tolerance[model.schedule.keyframe_samples[list(model.schedule.goals)]] = model.goal_tolerance[0]
+            tolerance[model.schedule.goal_samples] = model.goal_tolerance[0]
             always["tool_point.on_path"] = (-tolerance, tolerance)
         return always, exact
 
@@ -87,7 +87,7 @@ class RefineValues:
         low_pose, high_pose = -pose, pose
         if model.tool is None:
             goals = np.hstack([model.goal_positions, model.goal_vectors])
-            at, tolerance = schedule.keyframe_samples[list(schedule.goals)], np.repeat(model.goal_tolerance, 3)
+            at, tolerance = schedule.goal_samples, np.repeat(model.goal_tolerance, 3)
             low_pose[at], high_pose[at] = goals - tolerance, goals + tolerance
         rate = np.full((count, 6), np.inf)
         rate[[0, -1]] = 0.0

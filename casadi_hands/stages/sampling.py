@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from casadi_hands.motion import catmull_rom, held, linear
 from casadi_hands.stages.grasp import inward_normals, on_capsules
 from casadi_hands.stages.model import Model
+from casadi_hands.stages.palm_motion import carried_by_palm, seen_from_palm
 from casadi_hands.stages.whole_hand import WholeHand
 
 Array = NDArray[np.float64]
@@ -50,9 +51,14 @@ def resampled(hand: WholeHand, before: Model, after: Model) -> WholeHand:
 
 
 def shortened(model: Model, share: float) -> Model:
-    """The task over a share of the way from its first goal to each of the others; no contact is planned to move."""
-    positions, vectors = (goals[0] + share * (goals - goals[0]) for goals in (model.goal_positions, model.goal_vectors))
-    return replace(model, goal_positions=positions, goal_vectors=vectors, regrasp=None)
+    """The task over a share of the way from its first goal to each of the others; no contact is planned to move.
+
+    A palm that moves goes all its way, and a share of what the object moves as seen from it.
+    """
+    at = model.schedule.goal_samples
+    seen = seen_from_palm(model, np.hstack([model.goal_positions, model.goal_vectors]), at)
+    goals = carried_by_palm(model, seen[0] + share * (seen - seen[0]), at)
+    return replace(model, goal_positions=goals[:, :3], goal_vectors=goals[:, 3:], regrasp=None)
 
 
 def extrapolated(model: Model, first: WholeHand, second: WholeHand, by: float) -> WholeHand:
@@ -73,16 +79,19 @@ def extrapolated(model: Model, first: WholeHand, second: WholeHand, by: float) -
     )
 
 
-def at_rest(hand: WholeHand) -> WholeHand:
-    """A motion that stays where the given one starts."""
+def at_rest(model: Model, hand: WholeHand) -> WholeHand:
+    """A motion that stays where the given one starts; on a palm that moves it stays so as seen from there."""
 
     def still(values: Array) -> Array:
         return np.repeat(values[:1], len(values), axis=0)
 
+    moving = replace(model, palm_position=hand.palm_position, palm_quaternion=hand.palm_quaternion)
+    pose = np.hstack([still(hand.position), still(hand.vector)])
+    pose = carried_by_palm(moving, pose, np.arange(len(pose)))
     return replace(
         hand,
         angles=tuple(still(angles) for angles in hand.angles),
-        position=still(hand.position),
-        vector=still(hand.vector),
+        position=pose[:, :3],
+        vector=pose[:, 3:],
         point=still(hand.point),
     )

@@ -44,6 +44,8 @@ class Palm:
 def dynamics(contacts: int, suffix: str = "", regularise: bool = True) -> Kernel:
     """Newton–Euler at one sample (eq. 2.5, 2.6) and the object's accelerations (eq. 2.14, 2.15).
 
+    What a palm that moves carries is accelerated with it; only what differs from that costs.
+
     Args:
         contacts: number of contacts, the ground's included.
         suffix: of the term names, for a second scenario.
@@ -71,7 +73,7 @@ def dynamics(contacts: int, suffix: str = "", regularise: bool = True) -> Kernel
         "angular_momentum" + suffix, body.angular_momentum(points, forces, activity, local_torque, inertial_torque)
     )
     if regularise:
-        kernel.cost("object_acceleration", acceleration)
+        kernel.cost("object_acceleration", acceleration - kernel.parameter("carried", 3))
         kernel.cost("object_angular_acceleration", inertial_torque / step)
     return kernel
 

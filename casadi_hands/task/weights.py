@@ -50,7 +50,9 @@ class FloatingWeights(_WeightTable):
     slip_on_object: NonNegative = Field(default=100.0, description="Change of the gap to the object (eq. 2.12).")
     tangential_slip: NonNegative = Field(default=10.0, description="Slip of the contact along the object.")
     contact_acceleration: NonNegative = Field(default=0.01, description="Contacts' acceleration (eq. 2.13).")
-    object_acceleration: NonNegative = Field(default=0.1, description="Object's acceleration (eq. 2.14).")
+    object_acceleration: NonNegative = Field(
+        default=0.1, description="Object's acceleration (eq. 2.14), a moving palm's taken off."
+    )
     object_angular_acceleration: NonNegative = Field(default=1.0, description="Object's rate of spin (eq. 2.15).")
     palm_clearance: NonNegative = Field(default=100.0, description="Object and palm overlapping (3.2.3).")
     contact_patch: NonNegative = Field(default=1.0, description="Contacts away from where the task put them.")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -341,3 +341,9 @@ def check_derivatives(solver: Solver, values: Mapping[str, Array], parameters: M
         assert abs(slope - gradient @ way) < 1e-5 * np.linalg.norm(gradient) * np.linalg.norm(way)
         bent = (lagrangian_gradient(x + h * way) - lagrangian_gradient(x - h * way)) / (2 * h)
         assert np.abs(bent - hessian @ way).max() < 1e-3 * np.abs(bent).max()
+
+
+def standing(model: Model) -> Model:
+    """The task with its palm left where it is first."""
+    palm = (np.tile(values[0], (len(values), 1)) for values in (model.palm_position, model.palm_quaternion))
+    return replace(model, palm_position=next(palm), palm_quaternion=next(palm))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,16 +15,17 @@ from casadi_hands.stages.refine import LONG_WAY, SHORT_WAY, Refined, Worst
 from casadi_hands.stages.refine_values import Margin
 from casadi_hands.stages.sampling import resampled_model
 from casadi_hands.stages.whole_hand import WholeHand
-from tests.stages.example import everything, made_up_solution
+from tests.stages.example import everything, made_up_solution, standing
 from tests.stages.refining import carrying
 
-_, MODEL = everything()
+MODEL = standing(everything()[1])
 FEWER = resampled_model(MODEL, 0.2)
 
 
 @pytest.fixture(scope="module")
 def start() -> WholeHand:
-    return carrying().start
+    palm = {"palm_position": MODEL.palm_position, "palm_quaternion": MODEL.palm_quaternion}
+    return replace(carrying().start, **palm)
 
 
 class Told(Continuation):
@@ -121,11 +123,20 @@ def test_steps_get_shorter_where_they_fail_and_the_longest_exact_motion_is_kept(
     assert 0.3 / 2**2 > SHORTEST > 0.3 / 2**3
 
 
-def test_a_motion_that_fails_from_the_first_is_not_lengthened(start: WholeHand) -> None:
+def test_a_motion_of_which_no_part_is_exact_is_not_lengthened(start: WholeHand) -> None:
     told = Told(lambda coarse, share: False)
     refined = told.lengthen(start, 0.5)
-    assert len(told.taken) == 1
-    assert (refined.exact, refined.share) == (False, 0.5)
+    assert [share for *_, share, _ in told.taken] == [0.5, 0.25, 0.125]
+    assert (refined.exact, refined.share) == (False, 0.125)
+
+
+def test_where_the_first_part_fails_a_shorter_one_is_looked_for(start: WholeHand) -> None:
+    told = Told(lambda coarse, share: share < 0.3 or len(told.taken) > 1)
+    refined = told.lengthen(start, 0.5)
+    assert [share for coarse, _, share, _ in told.taken if coarse] == pytest.approx([0.5, 0.25, 0.5, 0.75, 1.0])
+    first, second = (place for *_, place in told.taken[:2])
+    assert second - start.position[0, 0] == pytest.approx((first - start.position[0, 0]) / 2)
+    assert refined.exact
 
 
 def test_a_short_rest_of_the_way_is_gone_in_one_step(start: WholeHand) -> None:

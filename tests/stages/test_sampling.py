@@ -6,11 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from casadi_hands.motion import Schedule
+from casadi_hands.stages.model import Model
 from casadi_hands.stages.sampling import at_rest, extrapolated, resampled, resampled_model, shortened
 from casadi_hands.stages.whole_hand import WholeHand
-from tests.stages.example import everything, project
+from tests.stages.example import everything, project, standing
 from tests.stages.refining import carrying
 
 Array = np.ndarray
@@ -84,8 +86,12 @@ def test_a_contact_touches_at_a_sample_as_from_the_last_before_it(start: WholeHa
     assert not there.active.all()
 
 
+def palm_frames(model: Model) -> tuple[Rotation, np.ndarray]:
+    return Rotation.from_quat(model.palm_quaternion, scalar_first=True), model.palm_position
+
+
 def test_goals_of_a_part_of_the_way_are_on_it() -> None:
-    _, model = everything()
+    model = standing(everything()[1])
     half = shortened(model, 0.5)
     first, last = model.goal_positions[0], model.goal_positions[-1]
     np.testing.assert_allclose(half.goal_positions[0], first)
@@ -94,13 +100,41 @@ def test_goals_of_a_part_of_the_way_are_on_it() -> None:
     np.testing.assert_array_equal(shortened(model, 1.0).goal_positions, model.goal_positions)
 
 
+def test_a_part_of_the_way_is_as_seen_from_a_palm_that_moves() -> None:
+    _, model = everything()
+    turns, places = palm_frames(model)
+    at = model.schedule.goal_samples
+    half = shortened(model, 0.5)
+
+    def seen(positions: np.ndarray) -> np.ndarray:
+        return turns[at].inv().apply(positions - places[at])
+
+    assert np.ptp(places[at], axis=0).max() > 0.1
+    assert (turns[at[-1]] * turns[0].inv()).magnitude() > 0.1
+    whole, part = seen(model.goal_positions), seen(half.goal_positions)
+    np.testing.assert_allclose(part, (whole + whole[0]) / 2, atol=1e-9)
+    # Half the turn about the same axis, by the palm's own turn more.
+    for k, (vector, short) in enumerate(zip(model.goal_vectors, half.goal_vectors, strict=True)):
+        palm = turns[at[k]] * turns[0].inv()
+        whole_turn = palm.inv() * Rotation.from_rotvec(vector)
+        half_turn = palm.inv() * Rotation.from_rotvec(short)
+        np.testing.assert_allclose((half_turn * half_turn * whole_turn.inv()).magnitude(), 0, atol=1e-9)
+
+
 def test_motions_go_on_as_they_have_grown(start: WholeHand) -> None:
     _, model = everything()
-    still = at_rest(start)
-    np.testing.assert_array_equal(still.position, np.tile(start.position[0], (len(start.position), 1)))
+    still = at_rest(model, start)
+    # At rest as seen from the palm, which moves.
+    palm = replace(model, palm_position=start.palm_position, palm_quaternion=start.palm_quaternion)
+    turns, places = palm_frames(palm)
+    seen = turns.inv().apply(still.position - places)
+    np.testing.assert_allclose(seen, np.tile(seen[0], (len(seen), 1)), atol=1e-12)
+    np.testing.assert_allclose(still.position[0], start.position[0], atol=1e-12)
+    held = turns.inv() * Rotation.from_rotvec(still.vector)
+    np.testing.assert_allclose((held[0].inv() * held).magnitude(), 0, atol=1e-7)
     # From rest to a motion, and half as far again, with contacts on the object.
     farther = extrapolated(model, still, start, 0.5)
-    np.testing.assert_allclose(farther.position, start.position + 0.5 * (start.position - start.position[0]))
+    np.testing.assert_allclose(farther.position, start.position + 0.5 * (start.position - still.position))
     np.testing.assert_allclose(farther.angles[1], start.angles[1] + 0.5 * (start.angles[1] - start.angles[1][0]))
     for contact, capsule in enumerate(model.capsules):
         expected = 1.5 * start.point[3, contact] - 0.5 * start.point[0, contact]
