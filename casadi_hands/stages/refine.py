@@ -27,7 +27,7 @@ _MOST = 1e7  # of a multiplier; a regular one was seen to reach a tenth of that
 # large one first wanders to the middle of all bounds and back; too small ones crawl along every bound they meet.
 SOFT = Options(150, tol=1e-3, acceptable_tol=1e-2, mu_init=1e-3, most_multiplier=_MOST, extra=_NEAR)
 FIRM_SOLVE = replace(SOFT, constr_viol_tol=1e-6, mu_init=1e-4)
-HARD = replace(FIRM_SOLVE, max_iter=200, tol=1e-4, acceptable_tol=1e-3, constr_viol_tol=1e-10)
+HARD = replace(FIRM_SOLVE, max_iter=300, tol=1e-4, acceptable_tol=1e-3, constr_viol_tol=1e-10)
 ACCEPTED = 1e-7  # largest violation with which a refined motion is handed on
 HOPELESS = 0.1  # half extents of slip: where firm solves leave more, rolling is out of the structure's reach
 FALLING = 0.5  # of the soft solve's slip: where the firm one leaves more than hopeless, but less than this, it goes on
