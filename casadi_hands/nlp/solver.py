@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import casadi as ca
@@ -116,6 +118,7 @@ class Solver:
             if np.isfinite(options.most_multiplier):
                 sizes = self.problem.variables.size, self.problem.constraints.size
                 self._watches[options] = settings["iteration_callback"] = Watch(*sizes, options.most_multiplier)
+            _load_ipopt()
             self._solvers[options] = ca.nlpsol("solver", "ipopt", f["nlp"], settings)
         return self._solvers[options]
 
@@ -210,3 +213,21 @@ class Solver:
             iterations=int(stats["iter_count"]) if "iterations" in stats else 0,
             seconds=seconds,
         )
+
+
+@cache
+def _load_ipopt() -> None:
+    """Load IPOPT so that its linear algebra has one thread: with more, sums are rounded otherwise from run to run.
+
+    OpenBLAS reads the number once, when it is loaded; CasADi brings one of its own, and loads it with the solver.
+    """
+    name = "OPENBLAS_NUM_THREADS"
+    before = os.environ.get(name)
+    os.environ[name] = "1"
+    try:
+        ca.load_nlpsol("ipopt")
+    finally:
+        if before is None:
+            del os.environ[name]
+        else:
+            os.environ[name] = before

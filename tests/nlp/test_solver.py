@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -232,3 +236,21 @@ def test_a_kernel_without_instances_changes_nothing_and_its_constraints_have_no_
     assert list(solution.terms) == ["from_near"]
     assert solution.constraints["idle.sum"].shape == (0, 1)
     assert solution.violations["idle.sum"] == 0
+
+
+def test_a_solve_starts_no_threads() -> None:
+    # In a process of its own, where nothing has loaded the solver's linear algebra, which may start a thread a core.
+    script = (
+        "import os, pinocchio, casadi as ca\n"
+        "from casadi_hands.nlp import Kernel, Problem, Solver\n"
+        "problem = Problem(); x = problem.variable('x', (1, 2))\n"
+        "kernel = Kernel('k'); kernel.cost('near', kernel.variable('a', 2) - 1)\n"
+        "problem.bind(kernel, [x]); before = len(os.listdir('/proc/self/task'))\n"
+        "assert 'OPENBLAS_NUM_THREADS' not in os.environ\n"
+        "Solver(problem).solve({}, {'weight.near': 1.0})\n"
+        "assert 'OPENBLAS_NUM_THREADS' not in os.environ\n"
+        "print(len(os.listdir('/proc/self/task')) - before)\n"
+    )
+    free = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    done = subprocess.run([sys.executable, "-c", script], env=free, capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "0", done.stderr
