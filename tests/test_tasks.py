@@ -40,8 +40,10 @@ def breaks_and_takes_anew(motion: Motion) -> None:
     assert [int(motion.contact_active[k + 1, top]) for k in changes] == [0, 1]
     lifted, touched = changes + 1
     before, after = motion.contact_point_object[lifted - 1, top], motion.contact_point_object[touched, top]
-    assert before[2] > 0.005
-    assert after[2] < -0.003
+    # It pushes one half, rolls with it, and takes the object anew on the other half.
+    assert motion.contact_point_object[0, top, 2] > 0.005
+    assert np.linalg.norm(after - before) > 0.004
+    assert after[2] < -0.002
     assert motion.contact_point_object[-1, top, 2] < -0.005
     others = [c for c in range(3) if c != top]
     assert motion.contact_active[:, others].all()
@@ -108,6 +110,7 @@ def test_two_palms_turn_the_capsule_on_the_table_alike() -> None:
     overhead, side = (planned(load_task(PROBLEMS / f"tabletop_rotation_{where}.yaml")) for where in ABOUT_THE_TABLE)
     for name in ("object_position", "object_orientation", "contact_force", "contact_point_object"):
         np.testing.assert_allclose(getattr(overhead, name), getattr(side, name), atol=1e-9)
+    for name in ("object_orientation", "contact_force", "contact_point_object"):  # the object may turn where it lies
         assert np.ptp(getattr(overhead, name), axis=0).max() > 1e-3
 
 

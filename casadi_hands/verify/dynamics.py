@@ -17,6 +17,10 @@ from scipy.spatial.transform import Rotation
 
 from casadi_hands.verify.folder import Folder
 
+FARTHEST_SHOT = 2 * np.pi
+"""rad that a shot may be corrected by."""
+FASTEST = 100.0
+"""rad from one sample to the next, to which rates are cut: faster ones would overflow."""
 SUBSTEPS = 8
 """Runge-Kutta steps from one sample to the next; at 0.1 s the integration error is far below 1e-9 m·g."""
 
@@ -91,15 +95,20 @@ def read_loads(folder: Folder) -> Loads:
 
 
 def shoot(folder: Folder) -> Shots:
-    """Shoot the object from every sample to the next under the stated forces."""
+    """Shoot the object from every sample to the next under the stated forces.
+
+    Where they whirl it so that no shot arrives, it is launched at its mean rate; rates then jump by all that is wrong.
+    """
     loads, rotation = read_loads(folder), object_rotation(folder)
     start, end, time = rotation[:-1], rotation[1:], loads.time[:, None]
-    rate = (start.inv() * end).as_rotvec() / time
+    mean = rate = (start.inv() * end).as_rotvec() / time
+    lost = np.zeros(len(rate), bool)
     for _ in range(20):
         miss, jacobian = _miss(folder, loads, start, end, rate)
         step = np.linalg.solve(jacobian, miss[..., None])[..., 0]
-        rate = rate - step
-        if np.max(np.abs(step * time)) < 1e-14:
+        lost |= np.linalg.norm(step * time, axis=1) > FARTHEST_SHOT
+        rate = np.where(lost[:, None], mean, rate - step)
+        if np.max(np.abs(step * time)[~lost], initial=0.0) < 1e-14:
             break
     travelled, gained, arrival_rate, _ = _integrate(folder, loads, start, rate)
     launch = (np.diff(folder.motion.object_position, axis=0) - travelled) / time
@@ -129,10 +138,10 @@ def _integrate(
         distance travelled (K, 3) and velocity gained (K, 3) in the world, arrival rate (K, 3), arrival orientation.
     """
     mass, inertia = folder.object.mass, folder.object.inertia
-    inverse = np.linalg.inv(inertia)
+    inverse, fastest = np.linalg.inv(inertia), FASTEST / loads.time[:, None]
 
     def slope(fraction: float, state: np.ndarray) -> np.ndarray:
-        velocity, quaternion, omega = state[:, 3:6], state[:, 6:10], state[:, 10:13]
+        velocity, quaternion, omega = state[:, 3:6], state[:, 6:10], np.clip(state[:, 10:13], -fastest, fastest)
         turn = Rotation.from_quat(quaternion, scalar_first=True)
         force, moment, external_force, external_torque = loads.at(fraction)
         acceleration = folder.gravity + (turn.apply(force) + external_force) / mass

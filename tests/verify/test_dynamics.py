@@ -112,3 +112,14 @@ def test_chord_between_contact_points_turns_less_than_the_surface(tmp_path: Path
     folder = _read(tmp_path, SPHERE, contact_active=active, contact_force=force, contact_point_object=points)
     expected = 1.5 * 0.03 * (1 - np.cos(0.1)) / (0.2 * 9.81 * 0.03)
     assert between_residual(folder) == pytest.approx(expected * np.ones(10), rel=1e-9)
+
+
+@pytest.mark.parametrize("squeeze", [3e1, 3e2, 3e3, 3e5])
+def test_forces_that_whirl_the_object_round_leave_a_large_residual(squeeze: float, tmp_path: Path) -> None:
+    points = np.tile([[-0.03, 0.004, 0.02], [0.03, 0, -0.02]], (11, 1, 1))
+    folder = _read(tmp_path, CAPSULE, **_squeezed(0.1, points, squeeze))
+    with np.errstate(all="ignore"):
+        shots = shoot(folder)
+        force, torque = sample_residual(folder, shots)
+    assert np.isfinite(force).all()
+    assert torque.min() > 5
