@@ -114,13 +114,6 @@ def test_two_palms_turn_the_capsule_on_the_table_alike() -> None:
         assert np.ptp(getattr(overhead, name), axis=0).max() > 1e-3
 
 
-@pytest.mark.slow
-def test_poor_contacts_slip_more_on_the_pencil() -> None:
-    names = ("pencil_pick_up", "pencil_pick_up_poor_contacts")
-    good, poor = (solve(load_task(PROBLEMS / f"{name}.yaml"), until="whole_hand") for name in names)
-    assert good.certificate["slip"]["value"] < 0.7 * poor.certificate["slip"]["value"]
-
-
 def planned(task: Task) -> Motion:
     """What stage 1 plans for a task."""
     motion = solve(task, until="floating").motion
