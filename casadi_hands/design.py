@@ -124,6 +124,11 @@ class Design:
     stages: list[dict[str, Any]] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=dict)
 
+    @property
+    def missed(self) -> set[str]:
+        """The figures of the certificate that do not hold."""
+        return {name for name, figure in self.certificate.items() if not figure["holds"]}
+
     def save(self, directory: str | Path) -> None:
         """Write the result folder; a partial design writes the files for which there is something to write.
 

@@ -20,7 +20,7 @@ from casadi_hands.stages.continuation import Continuation
 from casadi_hands.stages.floating import Floating
 from casadi_hands.stages.model import Model
 from casadi_hands.stages.outcome import design_change
-from casadi_hands.stages.palm_motion import seen_from_palm
+from casadi_hands.stages.palm_motion import goals_seen_from_palm
 from casadi_hands.stages.refine import Refined
 from casadi_hands.stages.refine_values import Margin
 from casadi_hands.stages.sampling import resampled, resampled_model, shortened
@@ -154,14 +154,14 @@ class Refiner:
         stage = Continuation(self.model, whole.contacts, tuple(f.joints for f in whole.fingers), whole.active)
         refined, margin = self._refined(stage, whole, margin, near, share)
         judged = self._judged(stage.model, refined, short, planned)
-        while (step := stage.model.schedule.step / 2) >= FINEST and refined.exact and missed(judged) & BETWEEN:
+        while (step := stage.model.schedule.step / 2) >= FINEST and refined.exact and judged.missed & BETWEEN:
             finer = resampled_model(stage.model, step)
             hand = resampled(refined.hand, stage.model, finer)
             stage = Continuation(finer, stage.contacts, stage.joints, hand.active)
             with self.record.stage("refine", f"again with samples {step:g} s apart: {judged.reason}"):
                 closer = self._attempt(whole, margin, partial(stage.renew, hand))
             design = self._judged(finer, closer, short, planned)
-            if len(missed(design)) >= len(missed(judged)):
+            if len(design.missed) >= len(judged.missed):
                 break
             judged, refined = design, closer
         drops = self._drops(judged)
@@ -231,8 +231,7 @@ class Refiner:
 
 def _within_reach(model: Model) -> float:
     """The share of the way to its goals over which an object turns by less than fingers can go with it."""
-    goals = np.hstack([model.goal_positions, model.goal_vectors])
-    seen = seen_from_palm(model, goals, model.schedule.goal_samples)
+    seen = goals_seen_from_palm(model)
     turns = np.linalg.norm(seen[:, 3:] - seen[0, 3:], axis=1)
     return float(min(1.0, SURELY / max(turns.max(), 1e-9)))
 
@@ -240,8 +239,3 @@ def _within_reach(model: Model) -> float:
 def serves(design: Design, drops: int) -> bool:
     """Whether a design is certified and few of its replays drop the object: another hand costs more than it gains."""
     return design.status == "certified" and drops <= MOST_DROPS
-
-
-def missed(design: Design) -> set[str]:
-    """The figures of the certificate that do not hold."""
-    return {name for name, figure in design.certificate.items() if not figure["holds"]}

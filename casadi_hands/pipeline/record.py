@@ -92,7 +92,7 @@ class Record:
         Returns:
             the best design so far.
         """
-        rank = sum(not figure["holds"] for figure in design.certificate.values()), drops
+        rank = len(design.missed), drops
         if self._best is None or rank < self._best[0]:
             self._best = rank, design
             self.keep(design)

@@ -119,13 +119,13 @@ class FloatingStage:
         runs = [("free", free)]
         best: tuple[float, float, Solution] | None = None
         for flags, threshold in self._candidates(free.values["activity"]):
-            solution = self._with_flags(flags, free, parameters)
+            solution = self._with_flags(flags, free.values, parameters)
             runs.append((f"threshold {threshold}", solution))
             better = solution.objective < (np.inf if best is None else best[1])
             if better and passes_gate(self.model, solution.values):
                 best = (threshold, solution.objective, solution)
         if best is None:
-            solution = self._with_flags(np.ones_like(free.values["activity"]), free, parameters)
+            solution = self._with_flags(np.ones_like(free.values["activity"]), free.values, parameters)
             best = (0.0, solution.objective, solution)
             runs.append(("all active", solution))
         threshold, _, chosen = best
@@ -165,8 +165,7 @@ class FloatingStage:
         """Solve for another task's motion of the same object, with the contacts active that are in a given one."""
         parameters = object_parameters(self.model) | term_weights(self.solver.problem, self.model, weights)
         flags = other.active.astype(float)
-        fixed = {"activity": flags}
-        solution = self._solved({**self.start(), **fixed}, parameters, fixed, fixed)
+        solution = self._with_flags(flags, self.start(), parameters)
         return self._like(other, flags, solution, (("part of the way", solution),))
 
     def _solved(
@@ -212,6 +211,8 @@ class FloatingStage:
                 candidates.append((flags.astype(float), threshold))
         return candidates
 
-    def _with_flags(self, flags: Array, start: Solution, parameters: Mapping[str, Array | float]) -> Solution:
+    def _with_flags(
+        self, flags: Array, start: Mapping[str, ArrayLike], parameters: Mapping[str, Array | float]
+    ) -> Solution:
         fixed = {"activity": flags}
-        return self._solved({**start.values, **fixed}, parameters, fixed, fixed)
+        return self._solved({**start, **fixed}, parameters, fixed, fixed)

@@ -184,6 +184,11 @@ class Model:
         return weights
 
     @property
+    def goal_poses(self) -> Array:
+        """(G, 6) position and rotation vector from the reference at the goals, world."""
+        return np.hstack([self.goal_positions, self.goal_vectors])
+
+    @property
     def perturbed(self) -> bool:
         """Whether the task asks for a second scenario with external wrenches."""
         return bool(np.any(self.perturbation_force) or np.any(self.perturbation_torque))

@@ -12,7 +12,7 @@ from casadi_hands.motion import eased, linear
 from casadi_hands.nlp import Problem, Rows
 from casadi_hands.stages import soft_object
 from casadi_hands.stages.model import Model
-from casadi_hands.stages.palm_motion import carried_by_palm, seen_from_palm
+from casadi_hands.stages.palm_motion import carried_by_palm, goals_seen_from_palm
 
 Array = NDArray[np.float64]
 CLEARANCE = 0.02  # half extents, asked of object and palm, and in exact motions of all bodies that do not touch
@@ -197,9 +197,7 @@ def straight_path(model: Model) -> Array:
     between, schedule = _between_goals(model, model.schedule.keyframes), model.schedule
     if model.tool is not None:
         return between @ np.hstack([model.goal_positions - model.tool, model.goal_vectors])
-    goals = np.hstack([model.goal_positions, model.goal_vectors])
-    seen = seen_from_palm(model, goals, schedule.goal_samples)
-    return carried_by_palm(model, between @ seen, schedule.keyframe_samples)
+    return carried_by_palm(model, between @ goals_seen_from_palm(model), schedule.keyframe_samples)
 
 
 def carried_acceleration(model: Model) -> Array:
@@ -218,7 +216,7 @@ def pose_bounds(model: Model) -> tuple[Array, Array]:
     widest = np.tile([np.inf] * 3 + [MOST_TURN] * 3, (sizes(model)[0], 1))
     lower, upper = -widest, widest
     if model.tool is None:
-        goals = np.hstack([model.goal_positions, model.goal_vectors])
+        goals = model.goal_poses
         chosen = list(model.schedule.goals)
         lower[chosen], upper[chosen] = goals - GOAL_TOLERANCE, goals + GOAL_TOLERANCE
     return lower, upper

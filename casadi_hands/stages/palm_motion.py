@@ -35,6 +35,11 @@ def carried_by_palm(model: Model, poses: Array, samples: NDArray[np.int64]) -> A
     return np.array([_moved(pose, *_since_start(model, k), back=False) for pose, k in zip(poses, samples, strict=True)])
 
 
+def goals_seen_from_palm(model: Model) -> Array:
+    """The goals (G, 6) as ``seen_from_palm`` has them."""
+    return seen_from_palm(model, model.goal_poses, model.schedule.goal_samples)
+
+
 def _stands(model: Model) -> bool:
     return not (np.ptp(model.palm_position, axis=0).any() or np.ptp(model.palm_quaternion, axis=0).any())
 

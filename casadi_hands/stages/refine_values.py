@@ -86,7 +86,7 @@ class RefineValues:
         pose = np.tile([np.inf] * 3 + [MOST_TURN] * 3, (count, 1))
         low_pose, high_pose = -pose, pose
         if model.tool is None:
-            goals = np.hstack([model.goal_positions, model.goal_vectors])
+            goals = model.goal_poses
             at, tolerance = schedule.goal_samples, np.repeat(model.goal_tolerance, 3)
             low_pose[at], high_pose[at] = goals - tolerance, goals + tolerance
         rate = np.full((count, 6), np.inf)
@@ -143,7 +143,7 @@ class RefineValues:
             values["push_force"] = model.perturbation_force[self.pushed]
             values["push_torque"] = model.perturbation_torque[self.pushed]
         if model.tool is None:
-            values["goals"] = np.hstack([model.goal_positions, model.goal_vectors])
+            values["goals"] = model.goal_poses
         else:
             values["tool"], values["tool_path"] = model.tool, tool_path(model)
         if self.structure.grounded and model.ground is not None:

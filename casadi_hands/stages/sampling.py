@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from casadi_hands.motion import catmull_rom, held, linear
 from casadi_hands.stages.grasp import inward_normals, on_capsules
 from casadi_hands.stages.model import Model
-from casadi_hands.stages.palm_motion import carried_by_palm, seen_from_palm
+from casadi_hands.stages.palm_motion import carried_by_palm, goals_seen_from_palm
 from casadi_hands.stages.whole_hand import WholeHand
 
 Array = NDArray[np.float64]
@@ -55,9 +55,8 @@ def shortened(model: Model, share: float) -> Model:
 
     A palm that moves goes all its way, and a share of what the object moves as seen from it.
     """
-    at = model.schedule.goal_samples
-    seen = seen_from_palm(model, np.hstack([model.goal_positions, model.goal_vectors]), at)
-    goals = carried_by_palm(model, seen[0] + share * (seen - seen[0]), at)
+    seen = goals_seen_from_palm(model)
+    goals = carried_by_palm(model, seen[0] + share * (seen - seen[0]), model.schedule.goal_samples)
     return replace(model, goal_positions=goals[:, :3], goal_vectors=goals[:, 3:], regrasp=None)
 
 

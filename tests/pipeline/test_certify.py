@@ -7,6 +7,7 @@ from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from casadi_hands.design import Design
@@ -18,6 +19,7 @@ from casadi_hands.search.algorithm import Candidate, Found
 from casadi_hands.stages.model import build_model
 from casadi_hands.stages.refine import Worst
 from casadi_hands.stages.refine_values import Margin
+from casadi_hands.task import parse_task
 from tests.search.example import ball_target, ball_task, hand, pointing
 from tests.stages.example import made_up_solution
 
@@ -215,3 +217,34 @@ def test_what_is_missed_only_between_samples_gets_more_of_them(
     assert tried == pytest.approx(steps)
     assert design.status == ("certified" if len(steps) > 1 else "feasible")
     assert drops == 0
+
+
+SPHERE = """\
+object: {mass: 0.05, shapes: [{sphere: {center: [0, 0, 0], radius: 0.03}}]}
+palm: {radius: 0.05, position: [0, 0, 0.3], facing: [0, 0, -1]}
+motion:
+  - {at: 0, position: [0, 0, 0.2]}
+  - {at: 3, position: [0, 0, 0.2], rotation: {axis: [0, 0, 1], degrees: -120}}
+  - {at: 6, position: [0, 0, 0.2], rotation: {axis: [0, 0, 1], degrees: 60}}
+fingers: {left: {touches: [0.03, 0, 0]}, right: {touches: [-0.03, 0, 0]}}
+"""
+
+
+@pytest.mark.parametrize("held_back", [True, False])
+def test_only_where_contacts_are_held_back_refinements_begin_with_a_part_of_the_way(
+    monkeypatch: pytest.MonkeyPatch, held_back: bool
+) -> None:
+    model, given = build_model(parse_task(SPHERE)), SimpleNamespace(name="the whole way")
+    asked: list[Any] = []
+    monkeypatch.setattr(type(model), "held_back", held_back)
+    monkeypatch.setattr(certify, "run_shortened", lambda record, part, whole: asked.append((part, whole)) or "a part")
+    anything: Any = None
+    begun = Certifier(anything, model, given, anything, anything, 1)._begun  # type: ignore[arg-type]
+    if not held_back:
+        assert begun == (model, given, 1.0)
+        assert asked == []
+        return
+    part, floating, share = begun
+    assert (floating, share) == ("a part", pytest.approx(0.75))  # 90 of 120 degrees
+    assert asked == [(part, given)]
+    np.testing.assert_allclose(np.degrees(part.goal_vectors[:, 2]), [0, -90, 45], atol=1e-9)

@@ -34,7 +34,9 @@ def refined(
 
 
 def test_an_exact_motion_needs_no_reason() -> None:
-    assert refined_reason(ball(), replace(refined("contact0.passive", 0.0), met=True)) == []
+    met = replace(refined("contact0.passive", 0.0), met=True)
+    assert refined_reason(ball(), met) == []
+    assert failing_fingers(ball(), met) == set()  # whatever its limits miss, it is not the worst of what is met
 
 
 def test_slip_is_laid_to_the_finger_that_slips_most() -> None:
