@@ -12,32 +12,32 @@ from casadi_hands.stages.model import Model
 Array = NDArray[np.float64]
 
 
-def seen_from_palm(model: Model, poses: Array, samples: NDArray[np.int64]) -> Array:
-    """Poses as they would be had the palm stayed where it is at the first sample.
+def goals_seen_from_palm(model: Model) -> Array:
+    """The goals (G, 6) as they would be had the palm stayed where it is at the first sample.
+
+    Position and rotation vector from the reference, world.
+    """
+    return _all_moved(model, model.goal_poses, model.schedule.goal_samples, back=True)
+
+
+def carried_by_palm(model: Model, poses: Array, samples: NDArray[np.int64]) -> Array:
+    """Poses as they are on the palm that moves; the inverse of what ``goals_seen_from_palm`` does.
 
     Args:
         model: the task, with the palm's motion.
-        poses: (K, 6) position and rotation vector from the reference, world.
+        poses: (K, 6) position and rotation vector from the reference, world, had the palm stayed.
         samples: (K,) index of each.
 
     Returns:
         (K, 6) likewise.
     """
+    return _all_moved(model, poses, samples, back=False)
+
+
+def _all_moved(model: Model, poses: Array, samples: NDArray[np.int64], back: bool) -> Array:
     if _stands(model):
         return poses
-    return np.array([_moved(pose, *_since_start(model, k), back=True) for pose, k in zip(poses, samples, strict=True)])
-
-
-def carried_by_palm(model: Model, poses: Array, samples: NDArray[np.int64]) -> Array:
-    """The inverse of ``seen_from_palm``."""
-    if _stands(model):
-        return poses
-    return np.array([_moved(pose, *_since_start(model, k), back=False) for pose, k in zip(poses, samples, strict=True)])
-
-
-def goals_seen_from_palm(model: Model) -> Array:
-    """The goals (G, 6) as ``seen_from_palm`` has them."""
-    return seen_from_palm(model, model.goal_poses, model.schedule.goal_samples)
+    return np.array([_moved(pose, *_since_start(model, k), back) for pose, k in zip(poses, samples, strict=True)])
 
 
 def _stands(model: Model) -> bool:
