@@ -31,6 +31,7 @@ HEAD = (
     "contact from object mm",
     "contact from finger mm",
     "penetration mm",
+    "slip from sample to sample mm",
     "friction excess on object (m·g)",
     "residual force (m·g)",
     "residual torque (m·g·l)",
@@ -79,6 +80,7 @@ def soft_figures(folder: Folder) -> list[str]:
         f"{1e3 * from_object:.2f}",
         f"{1e3 * from_finger:.2f}",
         f"{1e3 * penetration:.2f}",
+        f"{1e3 * max(planned_slips(folder, placed).values(), default=0.0):.2f}",
         f"{friction_excess_on_object(folder, placed):.3f}",
         f"{force.max():.3f}",
         f"{torque.max():.3f}",
@@ -106,6 +108,47 @@ def contact_distances(folder: Folder, placed: Placements) -> tuple[float, float]
             from_object = max(from_object, abs(folder.object.surface_distance(in_object)))
             from_finger = max(from_finger, abs(folder.links[link].surface_distance(in_link)))
     return from_object, from_finger
+
+
+def planned_slips(folder: Folder, placed: Placements) -> dict[str, float]:
+    """How far each finger's contact is planned to slide from sample to sample, in all, m.
+
+    The audit's slip lets physics move the object between samples; where a soft motion's forces nearly balance, a thin
+    object still whirls there, and that slip would drown the planned one.
+    """
+    motion = folder.motion
+    active = set(active_contacts(folder))
+    slips: dict[str, float] = {}
+    for c, name in enumerate(motion.contact_names):
+        if (link := motion.contact_link[c]) == "ground":
+            continue
+        both = [k for k in range(len(motion.time) - 1) if {(k, c), (k + 1, c)} <= active]
+        slips[name] = sum(_slid(folder, placed, link, c, k) for k in both)
+    return slips
+
+
+def _slid(folder: Folder, placed: Placements, link: str, c: int, k: int) -> float:
+    """How much farther a contact travels on one of its two bodies than on the other from a sample to the next, m.
+
+    The points that touch at either sample are carried to the other one; their mean cancels second-order errors.
+    """
+    motion = folder.motion
+
+    def carried(body: str, point: np.ndarray) -> np.ndarray:
+        before, after = (rotation @ point + position for rotation, position in (at(body, k), at(body, k + 1)))
+        return after - before
+
+    def at(body: str, sample: int) -> tuple[np.ndarray, np.ndarray]:
+        rotations, positions = placed[body]
+        return rotations[sample], positions[sample]
+
+    ends = (k, k + 1)
+    on_object = [carried("object", motion.contact_point_object[i, c]) for i in ends]
+    on_link = [carried(link, motion.contact_point_link[i, c]) for i in ends]
+    slid = (sum(on_object) - sum(on_link)) / 2
+    normal = sum(surface_normals(folder, placed, i, c)[0] for i in ends)
+    normal = normal / np.linalg.norm(normal)
+    return float(np.linalg.norm(slid - (slid @ normal) * normal))
 
 
 def friction_excess_on_object(folder: Folder, placed: Placements) -> float:

@@ -7,9 +7,15 @@ import apart
 import pretended_solves
 import pytest
 from shared import NOTHING
-from soft_figures import HEAD, main
+from soft_figures import HEAD, main, planned_slips
 
+from casadi_hands import load_task, solve
+from casadi_hands.verify.folder import read_folder
+from casadi_hands.verify.trajectory import sample_placements
 from tests.export.example import TASK
+from tests.verify.fixture import TIP, geared
+
+PROBLEMS = Path(__file__).parents[2] / "problems"
 
 
 def rows(monkeypatch: pytest.MonkeyPatch, folder: Path, how: str) -> list[dict[str, str]]:
@@ -41,3 +47,22 @@ def test_a_solve_that_leaves_nothing_is_a_row(monkeypatch: pytest.MonkeyPatch, t
     for row in rows(monkeypatch, tmp_path, "raises"):
         assert row["goals mm / deg"] == "failed: the solver crashed: ArithmeticError: no numbers left"
         assert row["joints"] == row["s in all"] == NOTHING
+
+
+@pytest.mark.parametrize(("ball", "finger"), [(0.4, -2.0), (0.3, 1.0)])
+def test_planned_slip_is_the_difference_of_arc_lengths(tmp_path: Path, ball: float, finger: float) -> None:
+    folder = read_folder(geared(tmp_path, ball, finger).write(tmp_path / "result"))
+    slips = planned_slips(folder, sample_placements(folder))
+    # Outer gears run opposite: no slip when 30 mm · ball = -6 mm · finger.
+    assert slips == {"left": pytest.approx(abs(0.03 * ball + TIP * finger), abs=1e-4), "right": 0}
+
+
+@pytest.mark.slow
+def test_poor_contacts_slip_more_on_the_pencil(tmp_path: Path) -> None:
+    """What figure 3.5 shows."""
+    slips = {}
+    for name in ("pencil_pick_up", "pencil_pick_up_poor_contacts"):
+        solve(load_task(PROBLEMS / f"{name}.yaml"), until="whole_hand", out=tmp_path / name)
+        folder = read_folder(tmp_path / name)
+        slips[name] = sum(planned_slips(folder, sample_placements(folder)).values())
+    assert slips["pencil_pick_up"] < 0.95 * slips["pencil_pick_up_poor_contacts"]

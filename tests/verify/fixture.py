@@ -344,3 +344,31 @@ friction: 0.5
 hand: {joint_limits: [-150, 150], link_radius: 0.006}
 """
 """A ball of 3 cm that stands half a metre over an upright palm, for scenes where the hand matters little."""
+
+
+TWIST = SPHERE.replace("position: [0, 0, -0.5]", "position: [-0.076, 0, -0.02]").replace("[-150, 150]", "[-170, 170]")
+
+
+def geared(directory: Path, ball: float, finger: float) -> Scene:
+    """A finger along z that turns about its own axis against the ball, like two gears; both in radians, in all."""
+    task, time = read_task(directory, TWIST), np.linspace(0.0, 1.0, 11)
+    scene = plain(task, time)
+    fingers = tuple(
+        type(f)(f.name, f.base, (type(f.links[0])(0.04, TIP, (0.0, 0.0, 1.0)),)) for f in scene.hand.fingers
+    )
+    # The palm stands so that the left finger's axis passes the ball's centre at the sum of radii, to the ball's left.
+    base = Rotation.from_matrix(task.palm.rotation)
+    place = np.array([-0.03 - TIP, 0, -0.02]) - base.apply(fingers[0].base)
+    angles, turned = np.zeros((11, 2)), Rotation.from_rotvec(np.outer(ball * time, [0, 0, 1.0]))
+    angles[:, 0] = finger * time
+    link = base * Rotation.from_rotvec(np.outer(angles[:, 0], [0, 0, 1.0]))
+    touch, side = np.array([-0.03, 0, 0]), np.array([TIP, 0, 0])
+    on_object, on_link = turned.apply(touch, inverse=True), link.apply(side, inverse=True) + np.array([0, 0, 0.02])
+    return Scene(task, type(scene.hand)(**{**vars(scene.hand), "fingers": fingers}), scene.motion).moved(
+        base_position=np.tile(place, (11, 1)),
+        joint_angles=angles,
+        object_orientation=turned.as_quat(scalar_first=True),
+        contact_active=np.tile([True, False], (11, 1)),
+        contact_point_object=np.stack([on_object, 0 * on_object], axis=1),
+        contact_point_link=np.stack([on_link, 0 * on_link], axis=1),
+    )

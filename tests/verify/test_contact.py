@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fixture import SPHERE, TIP, Scene, plain, read_task
+from fixture import SPHERE, TIP, geared, plain, read_task
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.verify.contact import (
@@ -82,37 +82,9 @@ def test_bounce_opens_a_gap(tmp_path: Path) -> None:
     assert 1e-3 < between.value < 2.1e-3
 
 
-TWIST = SPHERE.replace("position: [0, 0, -0.5]", "position: [-0.076, 0, -0.02]").replace("[-150, 150]", "[-170, 170]")
-
-
-def _geared(directory: Path, ball: float, finger: float) -> Scene:
-    """A finger along z that turns about its own axis against the ball, like two gears; both in radians, in all."""
-    task = read_task(directory, TWIST)
-    scene = plain(task, TIME)
-    fingers = tuple(
-        type(f)(f.name, f.base, (type(f.links[0])(0.04, TIP, (0.0, 0.0, 1.0)),)) for f in scene.hand.fingers
-    )
-    # The palm stands so that the left finger's axis passes the ball's centre at the sum of radii, to the ball's left.
-    base = Rotation.from_matrix(task.palm.rotation)
-    place = np.array([-0.03 - TIP, 0, -0.02]) - base.apply(fingers[0].base)
-    angles, turned = np.zeros((11, 2)), Rotation.from_rotvec(np.outer(ball * TIME, [0, 0, 1.0]))
-    angles[:, 0] = finger * TIME
-    link = base * Rotation.from_rotvec(np.outer(angles[:, 0], [0, 0, 1.0]))
-    touch, side = np.array([-0.03, 0, 0]), np.array([TIP, 0, 0])
-    on_object, on_link = turned.apply(touch, inverse=True), link.apply(side, inverse=True) + np.array([0, 0, 0.02])
-    return Scene(task, type(scene.hand)(**{**vars(scene.hand), "fingers": fingers}), scene.motion).moved(
-        base_position=np.tile(place, (11, 1)),
-        joint_angles=angles,
-        object_orientation=turned.as_quat(scalar_first=True),
-        contact_active=np.tile([True, False], (11, 1)),
-        contact_point_object=np.stack([on_object, 0 * on_object], axis=1),
-        contact_point_link=np.stack([on_link, 0 * on_link], axis=1),
-    )
-
-
 @pytest.mark.parametrize(("ball", "finger"), [(0.4, -2.0), (0.4, 0.0), (0.3, 1.0), (0.0, 1.5)])
 def test_geared_bodies_slip_by_the_difference_of_arc_lengths(tmp_path: Path, ball: float, finger: float) -> None:
-    folder = read_folder(_geared(tmp_path, ball, finger).write(tmp_path / "result"))
+    folder = read_folder(geared(tmp_path, ball, finger).write(tmp_path / "result"))
     slip = slip_figure(folder, build_trajectory(folder, shoot(folder)))
     # Outer gears run opposite: no slip when 30 mm · ball = -6 mm · finger.
     assert slip.value == pytest.approx(abs(0.03 * ball + TIP * finger), abs=2e-6)
@@ -120,7 +92,7 @@ def test_geared_bodies_slip_by_the_difference_of_arc_lengths(tmp_path: Path, bal
 
 
 def _pinched(directory: Path, force: np.ndarray) -> Folder:
-    scene = _geared(directory, 0.0, 0.0)
+    scene = geared(directory, 0.0, 0.0)
     forces = np.zeros((11, 2, 3))
     forces[:, 0] = force
     return read_folder(scene.moved(contact_force=forces).write(directory / "result"))
