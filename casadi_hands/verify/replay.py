@@ -115,11 +115,12 @@ class _Player:
         folder, scene = self.folder, Simulation(self.folder, perturbation)
         self.plan = plan = self.plan or Plan(folder, scene.step)
         scene.settle(plan, observer)
-        errors = np.empty((len(plan) - 1, 2))
+        positions, quaternions = np.empty((len(plan) - 1, 3)), np.empty((len(plan) - 1, 4))
         for i in range(len(plan) - 1):
             pushed = perturbation.push_start <= i * scene.step < perturbation.push_end
             scene.play(plan, i, np.asarray(perturbation.push) if pushed else np.zeros(3), observer)
-            errors[i] = plan.error(i + 1, *scene.object_pose())
+            positions[i], quaternions[i] = scene.object_pose()
+        errors = np.stack(plan.errors(1, positions, quaternions), axis=1)
         due = [c for c in range(len(folder.motion.contact_names)) if folder.motion.contact_active[-1, c]]
         lost = [c for c in due if not scene.touches(folder.motion.contact_link[c])]
         gone = errors[:, 0].max() > DROP * folder.length

@@ -86,11 +86,18 @@ class Plan:
         """Return the number of steps."""
         return len(self.angles)
 
-    def error(self, i: int, position: np.ndarray, quaternion: np.ndarray) -> tuple[float, float]:
-        """Return the distance (m) and angle (deg) of the object's pose from its plan at a step."""
-        away = float(np.linalg.norm(position - self._object_position[i]))
-        cosine = min(abs(float(quaternion @ self._object_quaternion[i])), 1.0)
-        return away, float(np.rad2deg(2 * np.arccos(cosine)))
+    def errors(self, first: int, positions: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return distance (m) and angle (deg) of the object's poses, (K, 3) and (K, 4), from its plan.
+
+        Args:
+            first: step of the first pose; the others are of the steps that follow.
+            positions: m, world.
+            quaternions: [w, x, y, z], world.
+        """
+        steps = slice(first, first + len(positions))
+        away = np.linalg.norm(positions - self._object_position[steps], axis=1)
+        cosine = np.minimum(np.abs(np.sum(quaternions * self._object_quaternion[steps], axis=1)), 1.0)
+        return away, np.rad2deg(2 * np.arccos(cosine))
 
 
 class Simulation:
@@ -150,8 +157,9 @@ class Simulation:
         )
         self.data.qpos[self._angles] = folder.motion.joint_angles[0] + self._bias
         turn = Rotation.from_rotvec(perturbation.start_turn) * object_rotation(folder)[0]
-        self._home = folder.motion.object_position[0] + np.asarray(perturbation.start_shift), turn
-        self.data.qpos[self._pose : self._pose + 3] = self._home[0]
+        position = folder.motion.object_position[0] + np.asarray(perturbation.start_shift)
+        self._home = position, turn.inv().as_quat(scalar_first=True)
+        self.data.qpos[self._pose : self._pose + 3] = position
         self.data.qpos[self._pose + 3 : self._pose + 7] = turn.as_quat(scalar_first=True)
         self._mujoco.mj_forward(self.model, self.data)
 
@@ -184,17 +192,29 @@ class Simulation:
     def _support(self, share: float) -> tuple[np.ndarray, np.ndarray]:
         """Return a share of the spring force and torque that hold the object at its start."""
         mass, (position, quaternion) = self.model.body_mass[self._object], self.object_pose()
-        turn = Rotation.from_quat(quaternion, scalar_first=True)
         # About every axis by its own inertia: a thin object would be shaken by what serves its length.
-        axes = (turn * Rotation.from_quat(self.model.body_iquat[self._object], scalar_first=True)).as_matrix()
-        inertia = axes @ np.diag(self.model.body_inertia[self._object]) @ axes.T
+        axes = self._matrix(self._product(quaternion, self.model.body_iquat[self._object]))
+        inertia = (axes * self.model.body_inertia[self._object]) @ axes.T
         velocity = self.data.qvel[self._twist : self._twist + 3]
-        rate = turn.apply(self.data.qvel[self._twist + 3 : self._twist + 6])
-        off = position - self._home[0]
-        turned = (turn * self._home[1].inv()).as_rotvec()
+        rate = self._matrix(quaternion) @ self.data.qvel[self._twist + 3 : self._twist + 6]
+        home_position, back_home = self._home
+        off, turned = position - home_position, np.empty(3)
+        self._mujoco.mju_quat2Vel(turned, self._product(quaternion, back_home), 1.0)
         force = mass * (-(SUPPORT**2) * off - 2 * SUPPORT * velocity)
         torque = inertia @ (-(SUPPORT**2) * turned - 2 * SUPPORT * rate)
         return share * force, share * torque
+
+    def _product(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """Return the quaternion (4,) of the second turn followed by the first."""
+        product = np.empty(4)
+        self._mujoco.mju_mulQuat(product, first, second)
+        return product
+
+    def _matrix(self, quaternion: np.ndarray) -> np.ndarray:
+        """Return the rotation (3, 3) of a quaternion (4,)."""
+        matrix = np.empty(9)
+        self._mujoco.mju_quat2Mat(matrix, quaternion)
+        return matrix.reshape(3, 3)
 
     def play(self, plan: Plan, i: int, push: np.ndarray, observer: Observer | None) -> None:
         """Drive the hand as planned for a step, and make it; ``push`` (3,) is a force on the object, N, world."""

@@ -18,7 +18,7 @@ from casadi_hands.export.mjcf import scene_mjcf
 from casadi_hands.verify import Perturbation, audit, replay, replay_many
 from casadi_hands.verify.folder import read_folder
 from casadi_hands.verify.perturb import draw_perturbation
-from casadi_hands.verify.simulation import SUPPORT, Simulation
+from casadi_hands.verify.simulation import SUPPORT, Simulation, load_mujoco
 
 
 def _write(scene: Scene, directory: Path) -> Path:
@@ -142,14 +142,15 @@ def test_the_support_damps_a_thin_object_about_every_axis_by_its_own_inertia() -
     turn = Rotation.from_rotvec([0.4, 0.1, -0.9])
     spin = turn * frame  # the long axis is the inertial frame's third
     rate_in_body = 3.0 * frame.as_matrix()[:, 2]
-    state = SimpleNamespace(
-        model=SimpleNamespace(body_mass=[0.02], body_inertia=[inertia], body_iquat=[frame.as_quat(scalar_first=True)]),
-        data=SimpleNamespace(qvel=np.concatenate([np.zeros(3), rate_in_body])),
-        object_pose=lambda: (np.zeros(3), turn.as_quat(scalar_first=True)),
-        _object=0,
-        _twist=0,
-        _home=(np.zeros(3), turn),
+    support = Simulation.__new__(Simulation)
+    support._mujoco = load_mujoco()
+    support.model = SimpleNamespace(
+        body_mass=[0.02], body_inertia=[inertia], body_iquat=[frame.as_quat(scalar_first=True)]
     )
-    force, torque = Simulation._support(state, 0.5)  # type: ignore[arg-type]
+    pose = np.concatenate([np.zeros(3), turn.as_quat(scalar_first=True)])
+    support.data = SimpleNamespace(qpos=pose, qvel=np.concatenate([np.zeros(3), rate_in_body]))
+    support._object = support._pose = support._twist = 0
+    support._home = np.zeros(3), turn.inv().as_quat(scalar_first=True)
+    force, torque = support._support(0.5)
     np.testing.assert_allclose(force, 0, atol=1e-15)
     np.testing.assert_allclose(torque, -0.5 * 5e-8 * 2 * SUPPORT * 3.0 * spin.as_matrix()[:, 2], rtol=1e-9)
