@@ -1,5 +1,6 @@
 """From keyframes to samples: splines, rotations, finite differences."""
 
+from casadi_hands.motion.derivative import derivative
 from casadi_hands.motion.rotation import (
     angle_squared,
     angular_motion,
@@ -18,6 +19,7 @@ __all__ = [
     "angular_motion",
     "catmull_rom",
     "conjugate",
+    "derivative",
     "eased",
     "exponential",
     "held",

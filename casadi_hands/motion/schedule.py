@@ -48,6 +48,11 @@ class Schedule:
         """The same keyframes with samples at most ``step`` seconds apart."""
         return Schedule(self.keyframes, _samples(self.keyframes.tolist(), step), self.goals, step)
 
+    def halved(self, intervals: NDArray[np.bool_]) -> Schedule:
+        """The same with one more sample in the middle of each marked interval (S - 1,) between samples."""
+        middles = (self.samples[1:] + self.samples[:-1])[intervals] / 2
+        return Schedule(self.keyframes, np.sort(np.append(self.samples, middles)), self.goals, self.step)
+
     @property
     def keyframe_samples(self) -> NDArray[np.int64]:
         """Index (N,) of the sample at each keyframe."""

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from functools import cached_property, partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from casadi_hands.design import Design
 from casadi_hands.errors import HandsError
@@ -26,8 +27,10 @@ from casadi_hands.stages.refine_values import Margin
 from casadi_hands.stages.sampling import resampled, resampled_model, shortened
 from casadi_hands.stages.whole_hand import WholeHand
 from casadi_hands.verify import replay, replay_many
+from casadi_hands.verify.report import Audit
 from casadi_hands.verify.simulation import load_mujoco
 
+Array = NDArray[np.float64]
 AMPLE = Margin()
 SMALL = Margin(friction=0.8, normal_force=0.25)
 FIRM = Margin(normal_force=2.0)
@@ -39,6 +42,9 @@ SURELY = np.pi / 2  # that an object may turn so that contacts can surely go wit
 # What an exact motion misses only by how it goes between its samples; then it gets more of them.
 BETWEEN = {"residual_between", "gap_between", "slip", "penetration", "joint_limit"}
 FINEST = 0.02  # s between samples
+ENOUGH = 0.7  # of a limit: intervals that contribute more are halved
+LEFT = 1 / 8  # of what an interval slips, once it is halved; a cubic spline's error falls to a sixteenth
+GAIN = 0.8  # of how far limits are missed, that more samples must reach to be worth still more
 HANDS_REFINED = 2  # hands of one structure that are tried before fingers get another joint
 
 
@@ -154,16 +160,21 @@ class Refiner:
         stage = Continuation(self.model, whole.contacts, tuple(f.joints for f in whole.fingers), whole.active)
         refined, margin = self._refined(stage, whole, margin, near, share)
         judged = self._judged(stage.model, refined, short, planned)
-        while (step := stage.model.schedule.step / 2) >= FINEST and refined.exact and judged.missed & BETWEEN:
-            finer = resampled_model(stage.model, step)
-            hand = resampled(refined.hand, stage.model, finer)
-            stage = Continuation(finer, stage.contacts, stage.joints, hand.active)
-            with self.record.stage("refine", f"again with samples {step:g} s apart: {judged.reason}"):
-                closer = self._attempt(whole, margin, partial(stage.renew, hand))
-            design = self._judged(finer, closer, short, planned)
-            if len(design.missed) >= len(judged.missed):
+        while refined.exact and judged.missed & BETWEEN:
+            schedule = stage.model.schedule
+            crowded = intervals_to_halve(self.judge.audited(judged), np.diff(schedule.samples))
+            if not crowded.any():
                 break
-            judged, refined = design, closer
+            finer = resampled_model(stage.model, schedule.halved(crowded))
+            hand = resampled(refined.hand, stage.model, finer)
+            text = f"again with samples in the middle of {crowded.sum()} of {len(crowded)} intervals: {judged.reason}"
+            with self.record.stage("refine", text):
+                halved = Continuation(finer, stage.contacts, stage.joints, hand.active)
+                closer = self._attempt(whole, margin, partial(halved.renew, hand))
+            design = self._judged(finer, closer, short, planned)
+            if len(design.missed) > len(judged.missed) or _excess(design) > GAIN * _excess(judged):
+                break
+            judged, refined, stage = design, closer, halved
         drops = self._drops(judged)
         if drops > DROPS and margin != FIRM:
             text = f"again with a firmer grip: {drops} of {REPLAYS} replays dropped the object"
@@ -234,6 +245,36 @@ def _within_reach(model: Model) -> float:
     seen = goals_seen_from_palm(model)
     turns = np.linalg.norm(seen[:, 3:] - seen[0, 3:], axis=1)
     return float(min(1.0, SURELY / max(turns.max(), 1e-9)))
+
+
+def intervals_to_halve(found: Audit, lengths: Array) -> NDArray[np.bool_]:
+    """The intervals between samples that must be shorter for a motion to keep its limits between samples, too.
+
+    Args:
+        found: by the audit.
+        lengths: (K,) of the intervals, s.
+    """
+    marked = np.zeros(len(lengths), bool)
+    for name in BETWEEN:
+        figure = found.figures[name]
+        if figure.holds or figure.by_interval is None or figure.limit is None:
+            continue
+        parts, most = figure.by_interval, ENOUGH * figure.limit
+        if name == "slip":
+            largest = np.argsort(-parts, kind="stable")
+            left = parts.sum() - (1 - LEFT) * np.cumsum(parts[largest])
+            marked[largest[: 1 + np.argmax(left <= most)] if (left <= most).any() else largest] = True
+        else:
+            marked |= parts > most
+    # What a joint does in an interval depends on the samples around it, too.
+    marked |= np.append(marked[1:], False) | np.append(False, marked[:-1])
+    return marked & (lengths >= 2 * FINEST)
+
+
+def _excess(design: Design) -> float:
+    """How many times a limit the worst figure is that misses it; 0 where none does."""
+    missed = [design.certificate[name] for name in design.missed]
+    return max((np.inf if f["value"] is None else f["value"] / max(f["limit"], 1e-12) for f in missed), default=0.0)
 
 
 def serves(design: Design, drops: int) -> bool:

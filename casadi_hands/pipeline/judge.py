@@ -14,6 +14,7 @@ from casadi_hands.reasons import Reason, tell
 from casadi_hands.stages.floating import Floating
 from casadi_hands.stages.model import Model
 from casadi_hands.verify import audit
+from casadi_hands.verify.report import Audit
 
 # Beyond these, where they are also beyond the limits, a motion is none: lengths in half extents, degrees, m·g.
 FEASIBLE = {
@@ -51,9 +52,7 @@ class Judge:
             planned: the hand with its motion before it was refined in vain, which may have left it far from any
                 motion: by this one motors are judged. The design itself by default.
         """
-        with tempfile.TemporaryDirectory() as scratch:
-            design.save(scratch)
-            verdict = audit(scratch)
+        verdict = self.audited(design)
         certificate = verdict.as_certificate()
         if verdict.certified:
             return replace(design, status="certified", reason="", certificate=certificate)
@@ -62,6 +61,12 @@ class Judge:
         reason = tell([*filter(None, first), *causes], missed_figures(design, verdict))
         possible = all(self._feasible(name, certificate[name]) for name in FEASIBLE if name in certificate)
         return replace(design, status="feasible" if possible else "failed", reason=reason, certificate=certificate)
+
+    def audited(self, design: Design) -> Audit:
+        """What the audit finds in a design's files."""
+        with tempfile.TemporaryDirectory() as scratch:
+            design.save(scratch)
+            return audit(scratch)
 
     def _feasible(self, name: str, figure: dict[str, Any]) -> bool:
         limit = FEASIBLE[name] * (self.model.units.length if name in _LENGTHS else 1.0)

@@ -52,7 +52,7 @@ class Continuation:
     @cached_property
     def coarse(self) -> RefineStage:
         """The stage with fewer knots, or the fine one where there would be as many."""
-        model = resampled_model(self.model, COARSE)
+        model = resampled_model(self.model, self.model.schedule.stepped(COARSE))
         samples = self.model.schedule.samples
         if len(model.schedule.samples) == len(samples):
             return self.fine

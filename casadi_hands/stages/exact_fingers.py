@@ -8,7 +8,7 @@ import casadi as ca
 from casadi import SX
 
 from casadi_hands.geometry import norm
-from casadi_hands.motion import conjugate, rotation_matrix
+from casadi_hands.motion import conjugate, derivative, rotation_matrix
 from casadi_hands.nlp import Kernel
 from casadi_hands.stages.finger_symbols import FingerSymbols, PlacedFinger, morphology
 from casadi_hands.stages.soft_fingers import distances
@@ -224,10 +224,10 @@ def joint_motion(joints: int, index: int, limited: bool) -> Kernel:
     """One finger's angles at three knots: smooth, and within the speed limit if there is one."""
     kernel = Kernel(f"joint_motion{index}")
     angles = [kernel.variable(f"angles{i}", joints) for i in range(3)]
-    step = kernel.parameter("step")
-    kernel.cost("joint_acceleration", (angles[2] - 2 * angles[1] + angles[0]) / step**2)
+    steps = [kernel.parameter(f"step{i}") for i in range(2)]
+    kernel.cost("joint_acceleration", derivative(angles, steps))
     if limited:
-        kernel.constrain("speed", ca.vertcat(angles[1] - angles[0], angles[2] - angles[1]) / step)
+        kernel.constrain("speed", ca.vertcat(*[(angles[i + 1] - angles[i]) / steps[i] for i in range(2)]))
     return kernel
 
 
@@ -238,8 +238,7 @@ def joint_jerk(joints: int, index: int) -> Kernel:
     """
     kernel = Kernel(f"joint_jerk{index}")
     angles = [kernel.variable(f"angles{i}", joints) for i in range(4)]
-    step = kernel.parameter("step")
-    kernel.cost("joint_jerk", (angles[3] - 3 * angles[2] + 3 * angles[1] - angles[0]) / step**3)
+    kernel.cost("joint_jerk", derivative(angles, [kernel.parameter(f"step{i}") for i in range(3)]))
     return kernel
 
 

@@ -7,7 +7,7 @@ from casadi import SX
 from numpy.polynomial.legendre import leggauss
 
 from casadi_hands.geometry import point_disc_distance
-from casadi_hands.motion import conjugate, multiply, rotation_matrix
+from casadi_hands.motion import conjugate, derivative, multiply, rotation_matrix
 from casadi_hands.nlp import Kernel
 from casadi_hands.stages.soft_object import placed
 from casadi_hands.stages.surface import path_between, smooth_surface
@@ -142,8 +142,7 @@ def object_jerk() -> Kernel:
     """
     kernel = Kernel("object_jerk")
     rates = [kernel.variable(f"rate{i}", 6) for i in range(3)]
-    step = kernel.parameter("step")
-    kernel.cost("object_jerk", (rates[2] - 2 * rates[1] + rates[0]) / step**2)
+    kernel.cost("object_jerk", derivative(rates, [kernel.parameter(f"step{i}") for i in range(2)]))
     return kernel
 
 

@@ -151,6 +151,10 @@ class RefineProblem:
         positions = [self.problem.parameters[name] for name in names]
         return [p if knots is None or len(p) == 1 else p[knots] for p in positions]
 
+    def _steps(self, *intervals: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+        """Positions of the times from knots to the next ones."""
+        return [self.problem.parameters["step"][i] for i in intervals]
+
     def _bind(
         self,
         knots: NDArray[np.int64],
@@ -174,7 +178,8 @@ class RefineProblem:
         self._bind(now, body.physics(), [*states, *wrenches], common, {"defect": (0, 0)})
         self._bind(every, body.wrench(columns), [self.wrench, self.point, self.force], [], {"sum": (0, 0)})
         inner = np.arange(self.knots - 2)
-        problem.bind(body.object_jerk(), [self.rate.take(inner + k) for k in range(3)], self._at(("step",), inner))
+        rates = [self.rate.take(inner + k) for k in range(3)]
+        problem.bind(body.object_jerk(), rates, self._steps(inner, inner + 1))
         ends = np.array([0, self.knots - 1])
         still = [r.take(ends) for r in (self.pose, self.wrench)]
         self._bind(ends, body.equilibrium(), still, self._at(("reference", "gravity")), {"sum": (0, 0)})
@@ -300,14 +305,14 @@ class RefineProblem:
         inner = np.arange(-1, count + 1)
         mirrored = np.where(inner < 0, 1, np.where(inner >= count, count - 2, inner))
         three = [self.angles[i].take(mirrored[offset : offset + count]) for offset in range(3)]
-        steps = self._at(("step",), np.clip(np.arange(count) - 1, 0, count - 2))
+        steps = self._steps(*(np.clip(np.arange(count) - back, 0, count - 2) for back in (1, 0)))
         self._bind(
             np.arange(count), finger.joint_motion(n, c, np.isfinite(speed)), three, steps, {"speed": (-speed, speed)}
         )
         switches = np.flatnonzero(np.diff(structure.active[:, i].astype(int))) + 1
         first = np.array([k for k in range(count - 3) if k + 1 not in switches and k + 2 not in switches], int)
         four = [self.angles[i].take(first + offset) for offset in range(4)]
-        problem.bind(finger.joint_jerk(n, c), four, self._at(("step",), first))
+        problem.bind(finger.joint_jerk(n, c), four, self._steps(first, first + 1, first + 2))
         wanted = self._at((f"wanted_base{c}", f"wanted_lengths{c}", f"wanted_axes{c}"))
         reach = (model.palm_radius - model.link_radius) ** 2
         problem.bind(finger.stay(n, c), self.shape[i], wanted, {"on_palm": (0, reach)})

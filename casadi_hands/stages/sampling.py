@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from casadi_hands.motion import catmull_rom, held, linear
+from casadi_hands.motion import Schedule, catmull_rom, held, linear
 from casadi_hands.stages.grasp import inward_normals, on_capsules
 from casadi_hands.stages.model import Model
 from casadi_hands.stages.palm_motion import carried_by_palm, goals_seen_from_palm
@@ -16,9 +16,8 @@ from casadi_hands.stages.whole_hand import WholeHand
 Array = NDArray[np.float64]
 
 
-def resampled_model(model: Model, step: float) -> Model:
-    """The task with samples at most ``step`` seconds apart."""
-    schedule = model.schedule.stepped(step)
+def resampled_model(model: Model, schedule: Schedule) -> Model:
+    """The task with other samples between the same keyframes."""
     was, now = model.schedule.samples, schedule.samples
     between, last = catmull_rom(was, now), held(was, now)
     quaternion = between @ model.palm_quaternion

@@ -72,4 +72,4 @@ def residual_figures(folder: Folder, shots: Shots) -> list[Figure]:
     inside = float(between[k])
     if at.value > inside:
         inside, words = at.value, at.finding
-    return [at, Figure("residual_between", inside, limits.residual_between, "weight", words)]
+    return [at, Figure("residual_between", inside, limits.residual_between, "weight", words, by_interval=between)]

@@ -37,13 +37,16 @@ def _neighbours(first: str, second: str) -> bool:
 def penetration_figure(folder: Folder, path: Trajectory) -> Figure:
     """Return the deepest overlap of any two bodies at dense times, m; zero when none overlap."""
     worst = (0.0, "no two bodies overlap")
+    depths = np.zeros(len(folder.motion.time) - 1)
     for first, second in body_pairs(folder):
         for i in range(0, len(path.time), DENSITY // 4):
             depth = -body_distance(first, path.at(first.name, i), second, path.at(second.name, i))
+            k = path.interval[i]
+            depths[k] = max(depths[k], depth)
             if depth > worst[0]:
                 names = f"{folder.call(first.name)} and {folder.call(second.name)}"
                 worst = (depth, f"{names} overlap by {{value}} at {path.time[i]:.3g} s")
-    return Figure("penetration", worst[0], folder.task.limits.penetration, "m", worst[1])
+    return Figure("penetration", worst[0], folder.task.limits.penetration, "m", worst[1], by_interval=depths)
 
 
 def joint_figures(folder: Folder, path: Trajectory) -> list[Figure]:
@@ -56,7 +59,10 @@ def joint_figures(folder: Folder, path: Trajectory) -> list[Figure]:
     words = f"joint {name} of {_finger(folder, name)} is {{value}} beyond its limit at {path.time[i]:.3g} s"
     if over[i, j] <= 0.0:
         words = "no joint is beyond its limit"
-    beyond = Figure("joint_limit", max(float(over[i, j]), 0.0), limits.joint_limit, "deg", words)
+    by_interval = np.zeros(len(folder.motion.time) - 1)
+    np.maximum.at(by_interval, path.interval, over.max(axis=1))
+    value = max(float(over[i, j]), 0.0)
+    beyond = Figure("joint_limit", value, limits.joint_limit, "deg", words, by_interval=by_interval)
     speed = np.abs(path.speeds)
     i, j = np.unravel_index(np.argmax(speed), speed.shape)
     name = folder.motion.joint_names[j]

@@ -99,6 +99,7 @@ def gap_between_samples(folder: Folder, path: Trajectory) -> Figure:
     """Return the largest distance of the two bodies of a contact while it is active, between samples too, m."""
     motion = folder.motion
     worst = (0.0, "no contact opens between samples")
+    gaps = np.zeros(len(motion.time) - 1)
     for c, name in enumerate(motion.contact_names):
         link = motion.contact_link[c]
         other = folder.ground if link == "ground" else folder.links[link]
@@ -106,8 +107,9 @@ def gap_between_samples(folder: Folder, path: Trajectory) -> Figure:
             if other is None or i % DENSITY == 0:
                 continue
             distance = body_distance(folder.object, path.at("object", i), other, path.at(link, i))
+            gaps[path.interval[i]] = max(gaps[path.interval[i]], distance)
             worst = max(worst, (distance, f"contact '{name}' has a gap of {{value}} at {path.time[i]:.4g} s"))
-    return Figure("gap_between", worst[0], folder.task.limits.gap_between, "m", worst[1])
+    return Figure("gap_between", worst[0], folder.task.limits.gap_between, "m", worst[1], by_interval=gaps)
 
 
 def slip_figure(folder: Folder, path: Trajectory) -> Figure:
@@ -119,13 +121,16 @@ def slip_figure(folder: Folder, path: Trajectory) -> Figure:
     """
     motion = folder.motion
     worst = (0.0, "no contact slips")
+    slips = np.zeros(len(motion.time) - 1)
     for c, name in enumerate(motion.contact_names):
         steps = _slip_steps(folder, path, c)
         for first, last in active_runs(folder, c):
             slip = float(np.sum(steps[first:last]))
             words = f"contact '{name}' slips {{value}} between {motion.time[first]:.3g} s and {motion.time[last]:.3g} s"
-            worst = max(worst, (slip, words))
-    return Figure("slip", worst[0], folder.task.limits.slip, "m", worst[1])
+            if slip > worst[0]:
+                worst, slips = (slip, words), np.zeros_like(steps)
+                slips[first:last] = steps[first:last]
+    return Figure("slip", worst[0], folder.task.limits.slip, "m", worst[1], by_interval=slips)
 
 
 def spin_figure(folder: Folder, path: Trajectory) -> Figure:

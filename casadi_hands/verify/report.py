@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
+
+import numpy as np
 
 _UNITS = {
     "m": (1000.0, " mm"),
@@ -34,6 +36,8 @@ class Figure:
         unit: ``m``, ``deg``, ``weight`` (the object's), ``share``, ``N·m``, ``rad/s`` or none.
         finding: the worst case as a sentence with ``{value}`` in it.
         at_least: whether the limit is a least value rather than a largest one.
+        by_interval: of a figure between samples, what each interval (S - 1,) has of it, in ``unit``: slips add up to
+            the value, of the others the largest is the value.
     """
 
     name: str
@@ -42,6 +46,7 @@ class Figure:
     unit: str
     finding: str
     at_least: bool = False
+    by_interval: np.ndarray | None = field(default=None, compare=False, repr=False)
 
     @property
     def holds(self) -> bool:

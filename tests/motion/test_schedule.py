@@ -56,3 +56,11 @@ def test_times_between_keyframes() -> None:
     schedule = Schedule.of([0.0, 0.6, 1.8], 1.8, 1, 0.1)
     expected = [0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.2, 1.4, 1.6, 1.8]
     np.testing.assert_allclose(schedule.between(2), expected, atol=1e-12)
+
+
+def test_halved_intervals_get_a_sample_in_their_middle_and_keyframes_stay() -> None:
+    schedule = Schedule.of([0.0, 0.4], 0.4, 1, 0.1)
+    halved = schedule.halved(np.array([True, False, False, True]))
+    np.testing.assert_allclose(halved.samples, [0, 0.05, 0.1, 0.2, 0.3, 0.35, 0.4])
+    np.testing.assert_allclose(halved.samples[halved.keyframe_samples], schedule.keyframes)
+    assert (halved.goals, halved.step) == (schedule.goals, schedule.step)

@@ -13,13 +13,14 @@ import pytest
 from casadi_hands.design import Design
 from casadi_hands.errors import HandsError
 from casadi_hands.pipeline import certify
-from casadi_hands.pipeline.certify import FIRM, REPLAYS, Certifier, Refiner
+from casadi_hands.pipeline.certify import FIRM, REPLAYS, Certifier, Refiner, intervals_to_halve
 from casadi_hands.pipeline.record import Record
 from casadi_hands.search.algorithm import Candidate, Found
 from casadi_hands.stages.model import build_model
 from casadi_hands.stages.refine import Worst
 from casadi_hands.stages.refine_values import Margin
 from casadi_hands.task import parse_task
+from casadi_hands.verify.report import Audit, Figure
 from tests.search.example import ball_target, ball_task, hand, pointing
 from tests.stages.example import made_up_solution
 
@@ -180,15 +181,15 @@ def test_what_a_firmer_grip_changes_is_told_from_the_hand_before_any_refinement(
     assert record.design.stages[-1]["design_change"] == {"from": whole, "to": firm}
 
 
-@pytest.mark.parametrize(("missed", "steps"), [("slip", [0.1, 0.05]), ("goal_angle", [0.1])])
+@pytest.mark.parametrize(("missed", "again"), [("slip", 2), ("goal_angle", 0)])
 def test_what_is_missed_only_between_samples_gets_more_of_them(
-    monkeypatch: pytest.MonkeyPatch, missed: str, steps: list[float]
+    monkeypatch: pytest.MonkeyPatch, missed: str, again: int
 ) -> None:
     model = build_model(ball_task())
-    tried: list[float] = []
+    tried: list[Any] = []
 
     class Once:
-        """Every motion is exact, and certified from 0.05 s between samples on."""
+        """Every motion is exact, and certified once two intervals beside the first were halved twice."""
 
         contacts, joints = (0, 1), (1, 1)
 
@@ -196,27 +197,52 @@ def test_what_is_missed_only_between_samples_gets_more_of_them(
             self.model = model
 
         def solve(self, start: Any, margin: Margin) -> Any:
-            tried.append(self.model.schedule.step)
+            tried.append(self.model.schedule.samples)
             return SimpleNamespace(exact=True, barely_rolls=False, hand=start, runs=(), weights={})
 
         renew = solve
 
     def judged(self: Refiner, model: Any, *_: Any) -> Design:
-        fine = model.schedule.step < 0.06
-        figure = {"holds": fine, "value": 1.0}
+        fine = np.diff(model.schedule.samples)[0] < 0.03
+        figure = {"holds": fine, "value": 0.0 if fine else 4.0 / len(tried), "limit": 1.0}
         return replace(self.record.design, status="certified" if fine else "feasible", certificate={missed: figure})
+
+    def audited(design: Design) -> Any:
+        parts = np.zeros(len(tried[-1]) - 1)
+        parts[0] = 4.0 / len(tried)
+        kept = {name: Figure(name, 0.0, 1.0, "m", "") for name in certify.BETWEEN}
+        return SimpleNamespace(figures={**kept, missed: Figure(missed, parts[0], 1.0, "m", "", by_interval=parts)})
 
     monkeypatch.setattr(certify, "Continuation", Once)
     monkeypatch.setattr(certify, "resampled", lambda hand, before, after: hand)
     monkeypatch.setattr(Refiner, "_attempt", lambda self, whole, margin, way: way(margin=margin))
     monkeypatch.setattr(Refiner, "_judged", judged)
     monkeypatch.setattr(Refiner, "_drops", lambda self, design: 0)
-    anything: Any = None
+    judge: Any = SimpleNamespace(audited=audited)
     whole: Any = SimpleNamespace(contacts=(0, 1), fingers=(), active=None)
-    design, _, drops = Refiner(Record(ball_task(), None, lambda _: None), model, anything, 1).certify(whole, ())
-    assert tried == pytest.approx(steps)
-    assert design.status == ("certified" if len(steps) > 1 else "feasible")
+    design, _, drops = Refiner(Record(ball_task(), None, lambda _: None), model, judge, 1).certify(whole, ())
+    assert [len(samples) - len(tried[0]) for samples in tried] == [0, 2, 4][: 1 + again]
+    assert design.status == ("certified" if again else "feasible")
     assert drops == 0
+
+
+def test_intervals_that_use_up_a_limit_and_their_neighbours_are_halved() -> None:
+    figures = {name: Figure(name, 0.0, 1.0, "m", "", by_interval=np.zeros(8)) for name in certify.BETWEEN}
+    lengths = np.full(8, 0.1)
+
+    def marked(name: str, parts: list[float]) -> list[int]:
+        value = sum(parts) if name == "slip" else max(parts)
+        figure = Figure(name, value, 1.0, "m", "", by_interval=np.array(parts))
+        found = intervals_to_halve(Audit("", {**figures, name: figure}, ()), lengths)
+        return np.flatnonzero(found).tolist()
+
+    assert marked("penetration", [0, 0, 1.5, 0, 0, 0, 0.8, 0.6]) == [1, 2, 3, 5, 6, 7]
+    assert marked("penetration", [0.9, 0.9, 0.9, 0, 0, 0, 0, 0]) == []  # the limit is kept
+    # One interval halved leaves 0.1 + 0.5 of the limit; of eight that slip alike, six must be.
+    assert marked("slip", [0, 0.8, 0, 0, 0.5, 0, 0, 0]) == [0, 1, 2]
+    assert marked("slip", [0.2] * 8) == [0, 1, 2, 3, 4, 5, 6]
+    lengths[1] = 0.03
+    assert marked("slip", [0, 0.8, 0, 0, 0.5, 0, 0, 0]) == [0, 2]
 
 
 SPHERE = """\

@@ -19,7 +19,7 @@ from tests.stages.example import everything, made_up_solution, standing
 from tests.stages.refining import carrying
 
 MODEL = standing(everything()[1])
-FEWER = resampled_model(MODEL, 0.2)
+FEWER = resampled_model(MODEL, MODEL.schedule.stepped(0.2))
 
 
 @pytest.fixture(scope="module")

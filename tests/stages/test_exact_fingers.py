@@ -304,13 +304,20 @@ def test_clearances_of_two_fingers_are_those_of_coal() -> None:
 
 def test_smoothness_and_staying() -> None:
     rng = np.random.default_rng(0)
-    angles = rng.normal(size=(3, 2))
+    times, angles = np.array([0.0, 0.05, 0.15, 0.21]), rng.normal(size=(4, 2))
+    steps = {f"step{i}": step for i, step in enumerate(np.diff(times))}
+    curve = [np.polynomial.Polynomial.fit(times[:3], column, 2) for column in angles[:3].T]
     found = numbers(
-        exact_fingers.joint_motion(2, 0, limited=True), {f"angles{i}": angles[i] for i in range(3)}, {"step": STEP}
+        exact_fingers.joint_motion(2, 0, limited=True),
+        {f"angles{i}": angles[i] for i in range(3)},
+        {name: steps[name] for name in ("step0", "step1")},
     )
-    speeds = np.diff(angles, axis=0) / STEP
+    speeds = np.diff(angles[:3], axis=0) / np.diff(times[:3])[:, None]
     np.testing.assert_allclose(found["speed"], speeds.ravel(), rtol=1e-12)
-    np.testing.assert_allclose(found["joint_acceleration"], ((np.diff(speeds, axis=0) / STEP) ** 2).sum(), rtol=1e-9)
+    np.testing.assert_allclose(found["joint_acceleration"], sum(c.deriv(2)(0.0) ** 2 for c in curve), rtol=1e-9)
+    curve = [np.polynomial.Polynomial.fit(times, column, 3) for column in angles.T]
+    found = numbers(exact_fingers.joint_jerk(2, 0), {f"angles{i}": angles[i] for i in range(4)}, steps)
+    np.testing.assert_allclose(found["joint_jerk"], sum(c.deriv(3)(0.0) ** 2 for c in curve), rtol=1e-9)
     finger, other = random_finger(2, rng), random_finger(2, rng)
     found = numbers(exact_fingers.stay(2, 0), shape(finger), shape(other))
     apart = [finger.base - other.base, finger.lengths - other.lengths, finger.axes - other.axes]
@@ -333,7 +340,10 @@ def test_derivatives_agree_with_differences() -> None:
         (exact_fingers.rolling(1, 0), rolling_block(before, after)),
         (exact_fingers.apart(2, 2, 0, 1, grounded=True), clearance_block(one, place, primitives)),
         (exact_fingers.fingers_apart(2, 3, "0_1"), pair_block(one, other)),
-        (exact_fingers.joint_motion(2, 0, limited=True), ({f"angles{i}": angles[i] for i in range(3)}, {"step": STEP})),
+        (
+            exact_fingers.joint_motion(2, 0, limited=True),
+            ({f"angles{i}": angles[i] for i in range(3)}, {"step0": STEP, "step1": 0.7 * STEP}),
+        ),
         (exact_fingers.stay(2, 0), (shape(one), shape(random_finger(2, rng)))),
     ):
         check_block(kernel, variables, parameters)

@@ -40,7 +40,7 @@ def test_keyframes_stay_and_samples_are_at_most_a_step_apart() -> None:
 
 def test_a_task_at_fewer_samples_has_the_same_palm_and_pushes_there() -> None:
     _, model = everything()
-    fewer = resampled_model(model, 0.2)
+    fewer = resampled_model(model, model.schedule.stepped(0.2))
     assert len(fewer.schedule.samples) < len(model.schedule.samples)
     for k, time in enumerate(fewer.schedule.samples):
         at = int(np.argmin(np.abs(model.schedule.samples - time)))
@@ -54,7 +54,7 @@ def test_a_task_at_fewer_samples_has_the_same_palm_and_pushes_there() -> None:
 
 def test_a_smooth_motion_comes_back_from_fewer_samples(start: WholeHand) -> None:
     _, model = everything()
-    fewer = resampled_model(model, 0.2)
+    fewer = resampled_model(model, model.schedule.stepped(0.2))
     times = model.schedule.samples
     contacts = start.point.shape[1]
     moving = replace(
@@ -78,7 +78,7 @@ def test_a_smooth_motion_comes_back_from_fewer_samples(start: WholeHand) -> None
 
 def test_a_contact_touches_at_a_sample_as_from_the_last_before_it(start: WholeHand) -> None:
     _, model = everything()
-    fewer = resampled_model(model, 0.2)
+    fewer = resampled_model(model, model.schedule.stepped(0.2))
     there = resampled(start, model, fewer)
     for k, time in enumerate(fewer.schedule.samples):
         last = int(np.flatnonzero(model.schedule.samples <= time + 1e-9)[-1])
