@@ -17,14 +17,13 @@ from numpy.typing import NDArray
 from casadi_hands.motion import held
 from casadi_hands.nlp import Solution
 from casadi_hands.stages.model import Model
-from casadi_hands.stages.refine import LONG_WAY, SHORT_WAY, Refined, RefineStage, Step
+from casadi_hands.stages.refine import LAST, LONG_WAY, RENEWED, SHORT_WAY, Refined, RefineStage, Step
 from casadi_hands.stages.refine_values import Margin
 from casadi_hands.stages.sampling import at_rest, extrapolated, resampled, resampled_model
 from casadi_hands.stages.whole_hand import WholeHand
 
 COARSE = 0.2  # s between coarse knots, at most
 SERVES = 0.1  # cost of slip and of forces that no joint supplies, of a start that is nearly exact
-LAST = SHORT_WAY[-1:]
 SHORTEST = 0.05  # of the way, by which a motion is lengthened at least
 LEAST = 0.1  # of the way, over which a first exact motion is looked for
 
@@ -87,14 +86,15 @@ class Continuation:
                 break
         return replace(refined, runs=runs)
 
-    def renew(self, start: WholeHand, margin: Margin | None = None) -> Refined:
+    def renew(self, start: WholeHand, margin: Margin | None = None, firmer: bool = False) -> Refined:
         """Refine a motion that is exact already, but for other samples or another margin.
 
         Args:
             start: the motion, at the task's samples.
             margin: to keep to the limits.
+            firmer: whether the margin is larger than the motion's.
         """
-        return self.fine.take(LAST, start, margin or Margin())
+        return self.fine.take(LAST if firmer else RENEWED, start, margin or Margin())
 
     def lengthen(self, start: WholeHand, share: float, margin: Margin | None = None) -> Refined:
         """Refine a motion over a share of the way to its goals, and lengthen it until it reaches them.
@@ -145,7 +145,7 @@ class Continuation:
         if not refined.met:
             return replace(refined, hand=hand)
         runs = refined.runs
-        for way in (LAST, SHORT_WAY):
+        for way in (RENEWED, SHORT_WAY):
             fine = self.fine.take(way, hand, margin, refined.share)
             runs += fine.runs
             if fine.met:

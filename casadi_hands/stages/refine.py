@@ -28,6 +28,8 @@ _MOST = 1e7  # of a multiplier; a regular one was seen to reach a tenth of that
 SOFT = Options(150, tol=1e-3, acceptable_tol=1e-2, mu_init=1e-3, most_multiplier=_MOST, extra=_NEAR)
 FIRM_SOLVE = replace(SOFT, constr_viol_tol=1e-6, mu_init=1e-4)
 HARD = replace(FIRM_SOLVE, max_iter=300, tol=1e-4, acceptable_tol=1e-3, constr_viol_tol=1e-10)
+# From an exact motion of the same margins: a larger barrier would first push it off every bound that it rests on.
+NEARBY = replace(HARD, mu_init=1e-5)
 ACCEPTED = 1e-7  # largest violation with which a refined motion is handed on
 HOPELESS = 0.1  # half extents of slip: where firm solves leave more, rolling is out of the structure's reach
 FALLING = 0.5  # of the soft solve's slip: where the firm one leaves more than hopeless, but less than this, it goes on
@@ -60,6 +62,8 @@ LONG_WAY: tuple[Step, ...] = (
 )
 # From an exact motion to one nearby; the first step can be left out where joints can follow and supply their forces.
 SHORT_WAY: tuple[Step, ...] = (LONG_WAY[1], LONG_WAY[-1])
+LAST: tuple[Step, ...] = SHORT_WAY[-1:]
+RENEWED: tuple[Step, ...] = (("exact", WEIGHTS | EXACT, NEARBY),)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from casadi_hands.geometry import nearest_on_axis
 from casadi_hands.stages.model import Model
 from casadi_hands.stages.object_side import MOST_FORCE, MOST_TURN, tool_path
 from casadi_hands.stages.refine_problem import RefineProblem
-from casadi_hands.stages.start import balanced, rates_and_wrenches
+from casadi_hands.stages.start import balanced, perturbations, rates_and_wrenches
 from casadi_hands.stages.whole_hand import WholeHand
 
 Array = NDArray[np.float64]
@@ -48,7 +48,7 @@ class RefineValues:
         self.structure, self.model = built.structure, model
         self.problem, self.pushed, self.knots = built.problem, built.pushed, built.knots
         # A contact that touches anew bears nothing until it does: its force grows from zero.
-        active = self.structure.active
+        self._active = active = self.structure.active
         self.bearing = active & np.vstack([active[:1], active[:-1]])
 
     def constraint_bounds(self, margin: Margin) -> tuple[Bounds, Bounds]:
@@ -91,10 +91,11 @@ class RefineValues:
             low_pose[at], high_pose[at] = goals - tolerance, goals + tolerance
         rate = np.full((count, 6), np.inf)
         rate[[0, -1]] = 0.0
-        force = np.repeat(np.where(self.bearing, MOST_FORCE, 0.0), 3, axis=1)
-        upper = {"rate": rate, "force": force}
+        bearing, active = (np.repeat(np.where(f, MOST_FORCE, 0.0), 3, axis=1) for f in (self.bearing, self._active))
+        upper = {"rate": rate, "force": bearing}
         if len(self.pushed):
-            upper["force_pushed"] = force[self.pushed]
+            # A perturbation may begin with a touch, and what it is held with is no force that has to grow.
+            upper["force_pushed"] = active[self.pushed]
         lower = {name: -bound for name, bound in upper.items()}
         return {"pose": low_pose, **lower}, {"pose": high_pose, **upper}
 
@@ -113,8 +114,10 @@ class RefineValues:
         }
         at, pushing = ((a[1:] + a[:-1]) / 2 for a in (points, forces))
         values["middle_torque"] = np.cross(at, pushing).sum(axis=1)
-        if len(self.pushed):
-            values["force_pushed"] = values["force"][self.pushed]
+        if len(k := self.pushed):
+            needed = wrenches[k] - perturbations(self.model, motion.vector)[k]
+            pushed = balanced(points[k], forces[k], self._active[k], needed)
+            values["force_pushed"] = pushed.reshape(len(k), -1)
         for c, finger, angles in zip(self.structure.contacts, motion.fingers, motion.angles, strict=True):
             values |= {f"angles{c}": angles, f"base{c}": finger.base, f"lengths{c}": finger.lengths}
             values[f"axes{c}"] = finger.axes.reshape(1, -1)

@@ -29,13 +29,25 @@ def rates_and_wrenches(model: Model, position: Array, vector: Array) -> tuple[Ar
     """
     times, reference = model.schedule.samples, pin.Quaternion(*model.reference).matrix()
     path, turn = (CubicSpline(times, values, bc_type="clamped") for values in (position, vector))
-    to_object = np.array([(pin.exp3(v) @ reference).T for v in vector])
+    to_object = _to_object(model, vector)
     spins = np.array([reference.T @ pin.Jexp3(v) @ w for v, w in zip(vector, turn(times, 1), strict=True)])
     spun = CubicSpline(times, spins)(times, 1)
     inertial, inertia = model.units.inertial, model.inertia
     force = np.einsum("sij,sj->si", to_object, inertial * path(times, 2) - model.gravity)
     torque = inertial * (np.cross(spins, spins @ inertia.T) + spun @ inertia.T)
     return np.hstack([path(times, 1), spins]), np.hstack([force, torque])
+
+
+def perturbations(model: Model, vector: Array) -> Array:
+    """The task's perturbing force and torque (S, 6) in the frame of an object with rotation vectors (S, 3)."""
+    both = model.perturbation_force, model.perturbation_torque
+    return np.hstack([np.einsum("sij,sj->si", _to_object(model, vector), each) for each in both])
+
+
+def _to_object(model: Model, vector: Array) -> Array:
+    """(S, 3, 3) from world axes to an object's with rotation vectors (S, 3) from the reference."""
+    reference = pin.Quaternion(*model.reference).matrix()
+    return np.array([(pin.exp3(v) @ reference).T for v in vector])
 
 
 def balanced(points: Array, forces: Array, active: NDArray[np.bool_], wrenches: Array) -> Array:

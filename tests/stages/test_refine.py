@@ -57,8 +57,11 @@ def test_forces_vanish_where_contacts_bear_nothing_and_the_object_rests_at_both_
         for row in range(3 * column, 3 * column + 3):
             np.testing.assert_array_equal(upper["force"][:, row] == 0, ~made_up.bearing[:, column])
     pushed = made_up.stage.given.pushed
-    np.testing.assert_array_equal(upper["force_pushed"], upper["force"][pushed])
-    assert (upper["force_pushed"] == 0).any()
+    # What holds against a push that begins with a touch need not grow.
+    active = made_up.stage.structure.active[pushed]
+    np.testing.assert_array_equal(upper["force_pushed"][:, ::3] > 0, active)
+    assert (active & ~made_up.bearing[pushed]).any()
+    assert not active.all()
     np.testing.assert_array_equal(upper["rate"][[0, -1]], 0)
     assert np.isinf(upper["rate"][1:-1]).all()
     for name in ("force", "force_pushed", "rate"):

@@ -10,7 +10,7 @@ from scipy.linalg import null_space
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.motion import Schedule
-from casadi_hands.stages.start import balanced, rates_and_wrenches
+from casadi_hands.stages.start import balanced, perturbations, rates_and_wrenches
 from tests.stages.example import everything
 
 Array = np.ndarray
@@ -47,6 +47,16 @@ def test_rates_and_wrenches_are_those_of_newton_and_euler() -> None:
         np.testing.assert_allclose(wrench, [*force, *torque], atol=2e-5)
     assert np.abs(rates[[0, -1]]).max() < 1e-12
     assert np.abs(wrenches[:, 3:]).max() > 2e-3
+
+
+def test_perturbations_are_turned_into_the_object() -> None:
+    _, model = everything()
+    vectors = np.random.default_rng(2).normal(size=model.perturbation_force.shape)
+    turns = Rotation.from_rotvec(vectors) * Rotation.from_quat(model.reference, scalar_first=True)
+    found = perturbations(model, vectors)
+    for columns, given in ((found[:, :3], model.perturbation_force), (found[:, 3:], model.perturbation_torque)):
+        np.testing.assert_allclose(turns.apply(columns), given, atol=1e-12)
+    assert found.any()
 
 
 def test_forces_change_as_little_as_the_wrench_allows() -> None:
