@@ -16,6 +16,7 @@ from casadi_hands.stages.model import Model
 from casadi_hands.stages.object_side import (
     bind_object,
     declare_object,
+    least_contacts,
     object_parameters,
     sizes,
     straight_path,
@@ -149,6 +150,8 @@ class FloatingStage:
         keyframes = len(before.pose)
         start = {**before.solution.values, "point": self.model.keyframe_patches.reshape(keyframes, -1)}
         flags = (before.active & ~self.model.regrasp.lifted).astype(float)
+        if flags.sum(axis=1).min() < least_contacts(self.model):
+            return None
         fixed = {"activity": flags}
         # Free, a contact that is to touch elsewhere would touch near where it was and slide there.
         patches = self.model.keyframe_patches
@@ -202,7 +205,7 @@ class FloatingStage:
     def _candidates(self, activity: Array) -> list[tuple[Array, float]]:
         """Distinct flags (N, C) of the thresholds; a keyframe left with too few contacts keeps its strongest."""
         candidates: list[tuple[Array, float]] = []
-        least = min(2, self.model.contacts)
+        least = least_contacts(self.model)
         for threshold in THRESHOLDS:
             flags = activity > threshold
             for row, strengths in zip(flags, activity, strict=True):

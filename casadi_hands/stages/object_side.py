@@ -146,8 +146,13 @@ def _bind_points(problem: Problem, model: Model, side: ObjectSide) -> None:
     for i in range(contacts):
         rows = [points.entries(3 * i, 3 * i + 3) for points in side.point]
         problem.bind(kernel, rows, [patches[:, 3 * i : 3 * i + 3], p["step"]])
-    least = min(2, model.contacts)
-    problem.bind(soft_object.enough_contacts(contacts), [side.keyframe_activity], [], {"sum": (least, np.inf)})
+    least = least_contacts(model), np.inf
+    problem.bind(soft_object.enough_contacts(contacts), [side.keyframe_activity], [], {"sum": least})
+
+
+def least_contacts(model: Model) -> int:
+    """How many contacts act at every keyframe."""
+    return min(2, model.contacts)
 
 
 def _bind_goals(problem: Problem, model: Model, side: ObjectSide) -> None:
