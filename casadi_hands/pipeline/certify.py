@@ -36,7 +36,7 @@ SMALL = Margin(friction=0.8, normal_force=0.25)
 FIRM = Margin(normal_force=2.0)
 REPLAYS = 12  # perturbed ones, that a certified design is tried on
 DROPS = 1  # of them; where more drop the object, a firmer grip is tried
-MOST_DROPS = 3  # where more do so then, too, another hand is
+MOST_DROPS = 3  # where more do so then, too, another hand is; or where all do, if refining one is long
 OUT_OF_REACH = 0.3  # half extents that a finger misses its contact by: nothing is left to refine
 SURELY = np.pi / 2  # that an object may turn so that contacts can surely go with it
 # What an exact motion misses only by how it goes between its samples; then it gets more of them.
@@ -83,7 +83,7 @@ class Certifier:
             for candidate in found.candidates[:HANDS_REFINED]:
                 judged, refined, drops = self._certify(candidate, found.short)
                 best = self.record.offer(judged, drops)
-                if serves(judged, drops):
+                if serves(judged, drops, REPLAYS - 1 if self._begun[2] < 1 else MOST_DROPS):
                     return judged
                 if judged.status != "certified":
                     self.record.say("refine", f"not certified: {judged.reason}")
@@ -277,6 +277,6 @@ def _excess(design: Design) -> float:
     return max((np.inf if f["value"] is None else f["value"] / max(f["limit"], 1e-12) for f in missed), default=0.0)
 
 
-def serves(design: Design, drops: int) -> bool:
+def serves(design: Design, drops: int, most: int = MOST_DROPS) -> bool:
     """Whether a design is certified and few of its replays drop the object: another hand costs more than it gains."""
-    return design.status == "certified" and drops <= MOST_DROPS
+    return design.status == "certified" and drops <= most

@@ -96,6 +96,16 @@ def test_a_certified_hand_that_drops_the_object_makes_way_for_one_that_drops_it_
     assert loop.least == []
 
 
+@pytest.mark.parametrize(("dropped", "tried"), [([5, 0], 1), ([11, 0], 1), ([12, 0], 2)])
+def test_where_a_motion_has_to_be_lengthened_only_a_hand_that_never_holds_makes_way(
+    monkeypatch: pytest.MonkeyPatch, dropped: list[int], tried: int
+) -> None:
+    loop = Loop(monkeypatch, [(0, "", False), (0, "", False)], max_joints=3)
+    loop.dropped, loop.__dict__["_begun"] = dropped, (None, None, 0.5)
+    loop.run(found((1, 1), (1, 1), (1, 1)))
+    assert len(loop.tried) == tried
+
+
 def test_the_finger_that_failed_gets_a_joint_until_none_may(monkeypatch: pytest.MonkeyPatch) -> None:
     verdicts = [(3, "contact1.passive", False), (4, "contact1.cone", False), (1, "contact1.cone", False)]
     loop = Loop(monkeypatch, [*verdicts, (2, "contact1.cone", False)], max_joints=3)
