@@ -213,7 +213,7 @@ def _moved_points(points: Array, old: Model, model: Model) -> Array:
         patches, before = np.vstack([patches, model.ground.patch]), np.vstack([before, old.ground.patch])
         capsules = np.vstack([capsules, model.ground.capsule])
     moved = points + patches - before * (old.units.length / model.units.length)
-    return np.array([on_capsules(p, capsules, inward_normals(p, capsules)) for p in moved])
+    return np.array([on_capsules(p, capsules) for p in moved])
 
 
 def _followed(was: WholeHand, moved: WholeHand, on_link: Array, old: Model, model: Model) -> WholeHand:

@@ -33,13 +33,10 @@ def inward_normals(points: Array, capsules: Array) -> Array:
     return np.array(normals)
 
 
-def on_capsules(points: Array, capsules: Array, inward: Array) -> Array:
-    """Points (C, 3) moved along their normals onto capsules (C, 7), object frame."""
-    moved = [
-        nearest_on_axis(point, capsule)[0] - capsule[6] * normal
-        for point, capsule, normal in zip(points, capsules, inward, strict=True)
-    ]
-    return np.array(moved)
+def on_capsules(points: Array, capsules: Array) -> Array:
+    """Points (C, 3) moved along their normals onto capsules (C, 7), all in one frame."""
+    pairs = zip(points, capsules, inward_normals(points, capsules), strict=True)
+    return np.array([nearest_on_axis(point, capsule)[0] - capsule[6] * inward for point, capsule, inward in pairs])
 
 
 def _surfaces(model: Model) -> tuple[Array, Array, Array]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from casadi_hands.design import Finger, Hand, Link, Motion
 from casadi_hands.kinematics import finger_kinematics
 from casadi_hands.stages.floating import Floating
-from casadi_hands.stages.grasp import inward_normals, on_capsules
+from casadi_hands.stages.grasp import on_capsules
 from casadi_hands.stages.model import Model, quaternion
 from casadi_hands.stages.object_side import sampled_points
 from casadi_hands.stages.synthesis import FingerSeed
@@ -99,7 +99,7 @@ def whole_hand_motion(model: Model, result: WholeHand) -> Motion:
     count = len(result.force)
     names = model.contact_names + (("ground",) if model.ground is not None else ())
     capsules = model.capsules if model.ground is None else np.vstack([model.capsules, model.ground.capsule])
-    point = np.array([on_capsules(p, capsules, inward_normals(p, capsules)) for p in result.point])
+    point = np.array([on_capsules(p, capsules) for p in result.point])
     on_link = np.zeros_like(point)
     links = ["none"] * model.contacts + (["ground"] if model.ground is not None else [])
     for i, (finger, contact) in enumerate(zip(result.fingers, result.contacts, strict=True)):
@@ -113,7 +113,7 @@ def whole_hand_motion(model: Model, result: WholeHand) -> Motion:
                 base, finger.axis_vectors.T, finger.lengths, result.angles[i][s], ca.DM.zeros(3)
             )
             local = np.asarray(rotations)[:, -3:].T @ (in_palm - np.asarray(origins)[:, -1])
-            on_link[s, contact] = on_capsules(local[None], tip, inward_normals(local[None], tip))[0]
+            on_link[s, contact] = on_capsules(local[None], tip)[0]
     if model.ground is not None:
         on_link[:, -1] = _in_world(model, result, point[:, -1])
         on_link[:, -1, 2] = model.ground.height

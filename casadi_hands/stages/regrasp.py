@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from casadi_hands.stages.grasp import inward_normals, on_capsules
+from casadi_hands.stages.grasp import on_capsules
 from casadi_hands.stages.model import Model, Regrasp, palm_from_world
 
 Array = NDArray[np.float64]
@@ -75,7 +75,7 @@ def _turns(model: Model, pose: Array) -> list[Array]:
 
 def _on_surface(model: Model, contact: int, point: Array) -> Array:
     capsule = model.capsules[contact : contact + 1]
-    return np.asarray(on_capsules(point[None], capsule, inward_normals(point[None], capsule))[0])
+    return np.asarray(on_capsules(point[None], capsule)[0])
 
 
 def _angle(first: Array, second: Array) -> float:

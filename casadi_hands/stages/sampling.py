@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from casadi_hands.motion import Schedule, catmull_rom, held, linear
-from casadi_hands.stages.grasp import inward_normals, on_capsules
+from casadi_hands.stages.grasp import on_capsules
 from casadi_hands.stages.model import Model
 from casadi_hands.stages.palm_motion import carried_by_palm, goals_seen_from_palm
 from casadi_hands.stages.whole_hand import WholeHand
@@ -73,7 +73,7 @@ def extrapolated(model: Model, first: WholeHand, second: WholeHand, by: float) -
         angles=tuple(beyond(a, b) for a, b in zip(first.angles, second.angles, strict=True)),
         position=beyond(first.position, second.position),
         vector=beyond(first.vector, second.vector),
-        point=np.array([on_capsules(p, capsules, inward_normals(p, capsules)) for p in points]),
+        point=np.array([on_capsules(p, capsules) for p in points]),
     )
 
 

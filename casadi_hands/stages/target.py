@@ -114,7 +114,7 @@ def target_of(model: Model, floating: Floating) -> Target:
         pose = floating.pose[k]
         turn = rotation @ pin.exp3(pose[3:]) @ pin.Quaternion(*model.reference).matrix()
         inward = inward_normals(floating.point[k, :contacts], model.capsules)
-        on_surface = on_capsules(floating.point[k, :contacts], model.capsules, inward)
+        on_surface = on_capsules(floating.point[k, :contacts], model.capsules)
         center = rotation @ (pose[:3] - position)
         force = floating.force[sample, :contacts] * floating.active[k, :contacts, None]
         points.append(on_surface @ turn.T + center)

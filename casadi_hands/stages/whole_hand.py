@@ -14,7 +14,7 @@ from casadi_hands.nlp import Options, Problem, Rows, Solution, Solver
 from casadi_hands.stages import soft_fingers
 from casadi_hands.stages.finger_numbers import contact_kinematics
 from casadi_hands.stages.floating import Floating
-from casadi_hands.stages.grasp import inward_normals, on_capsules
+from casadi_hands.stages.grasp import on_capsules
 from casadi_hands.stages.model import Model, palm_from_world, quaternion
 from casadi_hands.stages.object_side import (
     bind_object,
@@ -175,7 +175,7 @@ class WholeHandStage:
                 turn = pin.exp3(pose[3:]) @ pin.Quaternion(*model.reference).matrix()
                 local = turn.T @ (rotation.T @ in_palm + position - pose[:3])
                 capsule = model.capsules[c : c + 1]
-                points[k, c] = on_capsules(local[None], capsule, inward_normals(local[None], capsule))[0]
+                points[k, c] = on_capsules(local[None], capsule)[0]
         return points
 
     def _parameters(self, fingers: tuple[FingerSeed, ...]) -> dict[str, Array | float]:

@@ -65,4 +65,4 @@ def test_poor_contacts_slip_more_on_the_pencil(tmp_path: Path) -> None:
         solve(load_task(PROBLEMS / f"{name}.yaml"), until="whole_hand", out=tmp_path / name)
         folder = read_folder(tmp_path / name)
         slips[name] = sum(planned_slips(folder, sample_placements(folder)).values())
-    assert slips["pencil_pick_up"] < 0.95 * slips["pencil_pick_up_poor_contacts"]
+    assert slips["pencil_pick_up"] < 0.9 * slips["pencil_pick_up_poor_contacts"]
