@@ -74,3 +74,9 @@ def nearest_exponential(rotation: NDArray[np.float64], expected: NDArray[np.floa
     axis = vector / angle if angle > _AXIS_KNOWN else np.asarray(expected, float) / max(length, 1e-9)
     candidates = [vector + 2 * math.pi * k * axis for k in (-2, -1, 0, 1, 2)]
     return min(candidates, key=lambda candidate: float(np.linalg.norm(candidate - expected)))
+
+
+def continuous(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same orientations (S, 4) with signs chosen so that neighbours are near."""
+    signs = np.cumprod(np.where((quaternions[1:] * quaternions[:-1]).sum(axis=1) < 0, -1.0, 1.0))
+    return np.vstack([quaternions[:1], quaternions[1:] * signs[:, None]])

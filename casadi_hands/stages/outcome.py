@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from casadi_hands.design import Finger, Hand, Link, Motion
 from casadi_hands.kinematics import finger_kinematics
+from casadi_hands.motion import continuous
 from casadi_hands.stages.floating import Floating
 from casadi_hands.stages.grasp import on_capsules
 from casadi_hands.stages.model import Model, quaternion
@@ -165,9 +166,9 @@ def _motion(
     return Motion(
         time=model.schedule.samples,
         object_position=position * units.length,
-        object_orientation=_continuous(np.array([quaternion(r) for r in rotations])),
+        object_orientation=continuous(np.array([quaternion(r) for r in rotations])),
         base_position=palm_position * units.length,
-        base_orientation=_continuous(palm_quaternion),
+        base_orientation=continuous(palm_quaternion),
         joint_angles=angles,
         joint_names=joint_names,
         contact_names=contact_names,
@@ -179,12 +180,6 @@ def _motion(
         external_force=np.zeros_like(position),
         external_torque=np.zeros_like(position),
     )
-
-
-def _continuous(quaternions: Array) -> Array:
-    """The same orientations (S, 4) with signs chosen so that neighbours are near."""
-    signs = np.cumprod(np.where((quaternions[1:] * quaternions[:-1]).sum(axis=1) < 0, -1.0, 1.0))
-    return np.vstack([quaternions[:1], quaternions[1:] * signs[:, None]])
 
 
 def joint_loads(model: Model, result: WholeHand) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from casadi_hands.motion import Schedule, catmull_rom, held, linear
+from casadi_hands.motion import Schedule, catmull_rom, continuous, held, linear
 from casadi_hands.stages.grasp import on_capsules
 from casadi_hands.stages.model import Model
 from casadi_hands.stages.palm_motion import carried_by_palm, goals_seen_from_palm
@@ -17,10 +17,10 @@ Array = NDArray[np.float64]
 
 
 def resampled_model(model: Model, schedule: Schedule) -> Model:
-    """The task with other samples between the same keyframes."""
+    """The task with other samples between the same keyframes; perturbations last until the next of its own."""
     was, now = model.schedule.samples, schedule.samples
     between, last = catmull_rom(was, now), held(was, now)
-    quaternion = between @ model.palm_quaternion
+    quaternion = between @ continuous(model.palm_quaternion)
     return replace(
         model,
         schedule=schedule,
@@ -35,7 +35,7 @@ def resampled(hand: WholeHand, before: Model, after: Model) -> WholeHand:
     """A motion at the samples of the same task with others."""
     was, now = before.schedule.samples, after.schedule.samples
     between = catmull_rom(was, now)
-    quaternion = between @ hand.palm_quaternion
+    quaternion = between @ continuous(hand.palm_quaternion)
     return replace(
         hand,
         angles=tuple(between @ angles for angles in hand.angles),

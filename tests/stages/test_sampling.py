@@ -140,3 +140,17 @@ def test_motions_go_on_as_they_have_grown(start: WholeHand) -> None:
         expected = 1.5 * start.point[3, contact] - 0.5 * start.point[0, contact]
         np.testing.assert_allclose(farther.point[3, contact], project(expected, capsule)[0], atol=1e-9)
     np.testing.assert_array_equal(farther.force, start.force)
+
+
+def test_a_palm_whose_quaternions_change_sign_is_between_its_neighbours(start: WholeHand) -> None:
+    _, model = everything()
+    finer = resampled_model(model, model.schedule.halved(np.ones(len(model.schedule.samples) - 1, bool)))
+    # Facing down, w is about 0: normalised to w >= 0, neighbours differ in sign.
+    lean = 0.02 * np.sin(7 * model.schedule.samples)
+    turns = Rotation.from_rotvec(np.outer(np.pi + lean, [1, 0, 0])).as_quat(scalar_first=True)
+    turns *= np.where(turns[:, :1] < 0, -1, 1)
+    assert (np.diff(np.sign(turns[:, 1])) != 0).any()
+    there = resampled(replace(start, palm_quaternion=turns), model, finer)
+    wanted = Rotation.from_rotvec(np.outer(np.pi + 0.02 * np.sin(7 * finer.schedule.samples), [1, 0, 0]))
+    found = Rotation.from_quat(there.palm_quaternion, scalar_first=True)
+    np.testing.assert_allclose((wanted.inv() * found).magnitude(), 0, atol=2e-3)
