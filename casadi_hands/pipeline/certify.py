@@ -84,7 +84,7 @@ class Certifier:
                 judged, refined, drops = self._certify(candidate, found.short)
                 best = self.record.offer(judged, drops)
                 if serves(judged, drops, REPLAYS - 1 if self._begun[2] < 1 else MOST_DROPS):
-                    return judged
+                    return best
                 if judged.status != "certified":
                     self.record.say("refine", f"not certified: {judged.reason}")
                 failing |= failing_fingers(self.model, refined)
@@ -172,7 +172,7 @@ class Refiner:
                 halved = Continuation(finer, stage.contacts, stage.joints, hand.active)
                 closer = self._attempt(whole, margin, partial(halved.renew, hand))
             design = self._judged(finer, closer, short, planned)
-            if len(design.missed) > len(judged.missed) or _excess(design) > GAIN * _excess(judged):
+            if _excess(design) > GAIN * _excess(judged) and len(design.missed) >= len(judged.missed):
                 break
             judged, refined, stage = design, closer, halved
         drops = self._drops(judged)
@@ -254,27 +254,32 @@ def intervals_to_halve(found: Audit, lengths: Array) -> NDArray[np.bool_]:
         found: by the audit.
         lengths: (K,) of the intervals, s.
     """
+    able = lengths >= 2 * FINEST - 1e-9
     marked = np.zeros(len(lengths), bool)
     for name in BETWEEN:
         figure = found.figures[name]
         if figure.holds or figure.by_interval is None or figure.limit is None:
             continue
-        parts, most = figure.by_interval, ENOUGH * figure.limit
-        if name == "slip":
-            largest = np.argsort(-parts, kind="stable")
-            left = parts.sum() - (1 - LEFT) * np.cumsum(parts[largest])
-            marked[largest[: 1 + np.argmax(left <= most)] if (left <= most).any() else largest] = True
-        else:
-            marked |= parts > most
+        most = ENOUGH * figure.limit
+        if name != "slip":
+            marked |= figure.by_interval > most
+            continue
+        for run in figure.by_interval:
+            gains = (1 - LEFT) * np.where(able, run, 0.0)
+            largest = np.argsort(-gains, kind="stable")
+            # None where the run slips little, all where halving all of them is not enough.
+            needed = np.searchsorted(np.cumsum(gains[largest]), run.sum() - most)
+            chosen = largest[: needed + 1 if run.sum() > most else 0]
+            marked[chosen[gains[chosen] > 0]] = True
     # What a joint does in an interval depends on the samples around it, too.
     marked |= np.append(marked[1:], False) | np.append(False, marked[:-1])
-    return marked & (lengths >= 2 * FINEST)
+    return marked & able
 
 
 def _excess(design: Design) -> float:
-    """How many times a limit the worst figure is that misses it; 0 where none does."""
-    missed = [design.certificate[name] for name in design.missed]
-    return max((np.inf if f["value"] is None else f["value"] / max(f["limit"], 1e-12) for f in missed), default=0.0)
+    """How far the worst figure between samples is beyond its limit, over the limit; 0 where all are kept."""
+    missed = [design.certificate[name] for name in design.missed & BETWEEN]
+    return max((np.inf if f["value"] is None else f["value"] / max(f["limit"], 1e-12) - 1 for f in missed), default=0.0)
 
 
 def serves(design: Design, drops: int, most: int = MOST_DROPS) -> bool:

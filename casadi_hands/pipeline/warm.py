@@ -74,7 +74,7 @@ def kept_margin(earlier: Design) -> Margin:
     for c in whole.contacts:
         active = whole.active[:, c]
         bearing = active & np.append(active[:1], active[:-1])
-        asked = eased_in(bearing)
+        asked = eased_in(bearing, model.schedule.samples)
         points, force = whole.point[bearing, c], whole.force[bearing, c]
         inward = inward_normals(points, np.tile(model.capsules[c], (len(points), 1)))
         normal = (force * inward).sum(axis=1)

@@ -94,7 +94,13 @@ class Continuation:
             margin: to keep to the limits.
             firmer: whether the margin is larger than the motion's.
         """
-        return self.fine.take(LAST if firmer else RENEWED, start, margin or Margin())
+        runs: tuple[tuple[str, Solution], ...] = ()
+        for way in (LAST,) if firmer else (RENEWED, LAST):
+            refined = self.fine.take(way, start, margin or Margin())
+            runs += refined.runs
+            if refined.met:
+                break
+        return replace(refined, runs=runs)
 
     def lengthen(self, start: WholeHand, share: float, margin: Margin | None = None) -> Refined:
         """Refine a motion over a share of the way to its goals, and lengthen it until it reaches them.

@@ -15,7 +15,7 @@ from casadi_hands.stages.start import balanced, perturbations, rates_and_wrenche
 from casadi_hands.stages.whole_hand import WholeHand
 
 Array = NDArray[np.float64]
-EASED = 5  # knots over which a contact that touches or lifts comes to press with its full force, or to let go
+EASED = 0.5  # s over which a contact that touches or lifts comes to press with its full force, or to let go
 TOOL_TOLERANCE = 5e-3  # half extents, how far a drawing's tool may leave its path between goals
 SLIDING_TIE = 0.3  # of a contact to where it was planned to slide; it shall roll if it can
 Bounds = dict[str, tuple[ArrayLike, ArrayLike]]
@@ -57,27 +57,33 @@ class RefineValues:
         Contact and rolling are met within a small part of the task's limits. Where joints have one freedom less than
         the motion needs, or a motion in a plane meets some of them twice, equations would have no solver's solution.
         """
-        structure, model = self.structure, self.model
+        structure, model, times = self.structure, self.model, self.model.schedule.samples
         always: Bounds = {}
         exact: Bounds = {}
         for i, c in enumerate(structure.contacts):
-            floor = margin.normal_force * eased_in(self.bearing[:, i])[structure.touching[:, i]]
+            floor = margin.normal_force * eased_in(self.bearing[:, i], times)[structure.touching[:, i]]
             always[f"contact{c}.pressing"] = (floor[:, None], np.inf)
             # The point stays on the object's surface, where its force acts; the link may be a little off it.
             exact[f"contact{c}.on_link"] = (-model.gap_tolerance, model.gap_tolerance)
-            slip = model.slip_tolerance / (np.sqrt(2) * longest_run(structure.active[:, i]))
+            slip = self._slip_allowed(i)
             exact[f"rolling{c}.no_slip"] = (-slip, slip)
             for kernel in ("contact", "held"):
                 if f"{kernel}{c}.passive" in self.problem.constraint_rows:
                     exact[f"{kernel}{c}.passive"] = (-margin.passive, margin.passive)
         if structure.grounded:
-            slip = model.slip_tolerance / (np.sqrt(2) * longest_run(structure.active[:, -1]))
+            slip = self._slip_allowed(-1)
             exact["ground_rolling.no_slip"] = (-slip, slip)
         if model.tool is not None:
             tolerance = np.full((self.knots, 3), TOOL_TOLERANCE)
             tolerance[model.schedule.goal_samples] = model.goal_tolerance[0]
             always["tool_point.on_path"] = (-tolerance, tolerance)
         return always, exact
+
+    def _slip_allowed(self, column: int) -> Array:
+        """Share (K, 1) of the slip tolerance, by length, of each interval in which a contact touches."""
+        lengths, active = np.diff(self.model.schedule.samples), self.structure.active[:-1, column]
+        share = lengths[active] / longest_run(active, lengths)
+        return np.asarray(self.model.slip_tolerance / np.sqrt(2) * share[:, None])
 
     def bounds(self) -> tuple[dict[str, Array], dict[str, Array]]:
         """Lower and upper bounds of variables: goals, rest at both ends, no force where there is no contact."""
@@ -164,19 +170,19 @@ class RefineValues:
         return values
 
 
-def eased_in(bearing: NDArray[np.bool_]) -> Array:
-    """Share (S,) of the normal force asked of a contact: it grows after a touch and falls before a lift, over knots."""
-    idle = np.flatnonzero(~bearing)
-    if not len(idle):
+def eased_in(bearing: NDArray[np.bool_], times: Array) -> Array:
+    """Share (S,) of the normal force asked of a contact at times (S,): it grows after a touch, falls before a lift."""
+    if bearing.all():
         return np.ones(len(bearing))
-    away = np.abs(np.arange(len(bearing))[:, None] - idle).min(axis=1)
+    away = np.abs(times[:, None] - times[~bearing]).min(axis=1)
     return np.asarray(np.minimum(away / EASED, 1.0))
 
 
-def longest_run(flags: NDArray[np.bool_]) -> int:
-    """Length of the longest stretch of set flags (S,); 1 where none is set."""
+def longest_run(flags: NDArray[np.bool_], lengths: Array) -> float:
+    """Longest stretch of intervals (K,) with set flags, in all of their lengths; 0 where none is set."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
-    return max(1, int((edges[1::2] - edges[::2]).max(initial=1)))
+    passed = np.append(0.0, np.cumsum(lengths))
+    return float((passed[edges[1::2]] - passed[edges[::2]]).max(initial=0.0))
 
 
 def _helpers(points: Array, capsule: Array) -> Array:

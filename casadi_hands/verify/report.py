@@ -36,8 +36,8 @@ class Figure:
         unit: ``m``, ``deg``, ``weight`` (the object's), ``share``, ``N·m``, ``rad/s`` or none.
         finding: the worst case as a sentence with ``{value}`` in it.
         at_least: whether the limit is a least value rather than a largest one.
-        by_interval: of a figure between samples, what each interval (S - 1,) has of it, in ``unit``: slips add up to
-            the value, of the others the largest is the value.
+        by_interval: of a figure between samples, what each interval (S - 1,) has of it, in ``unit``; of slip
+            (runs, S - 1), of every stretch from touch to lift.
     """
 
     name: str

@@ -220,8 +220,9 @@ def test_what_is_missed_only_between_samples_gets_more_of_them(
     def audited(design: Design) -> Any:
         parts = np.zeros(len(tried[-1]) - 1)
         parts[0] = 4.0 / len(tried)
+        parts = parts if missed != "slip" else parts[None]
         kept = {name: Figure(name, 0.0, 1.0, "m", "") for name in certify.BETWEEN}
-        return SimpleNamespace(figures={**kept, missed: Figure(missed, parts[0], 1.0, "m", "", by_interval=parts)})
+        return SimpleNamespace(figures={**kept, missed: Figure(missed, parts.sum(), 1.0, "m", "", by_interval=parts)})
 
     monkeypatch.setattr(certify, "Continuation", Once)
     monkeypatch.setattr(certify, "resampled", lambda hand, before, after: hand)
@@ -240,9 +241,9 @@ def test_intervals_that_use_up_a_limit_and_their_neighbours_are_halved() -> None
     figures = {name: Figure(name, 0.0, 1.0, "m", "", by_interval=np.zeros(8)) for name in certify.BETWEEN}
     lengths = np.full(8, 0.1)
 
-    def marked(name: str, parts: list[float]) -> list[int]:
-        value = sum(parts) if name == "slip" else max(parts)
-        figure = Figure(name, value, 1.0, "m", "", by_interval=np.array(parts))
+    def marked(name: str, *parts: list[float]) -> list[int]:
+        value = max(map(sum, parts)) if name == "slip" else max(parts[0])
+        figure = Figure(name, value, 1.0, "m", "", by_interval=np.array(parts if name == "slip" else parts[0]))
         found = intervals_to_halve(Audit("", {**figures, name: figure}, ()), lengths)
         return np.flatnonzero(found).tolist()
 
@@ -251,8 +252,12 @@ def test_intervals_that_use_up_a_limit_and_their_neighbours_are_halved() -> None
     # One interval halved leaves 0.1 + 0.5 of the limit; of eight that slip alike, six must be.
     assert marked("slip", [0, 0.8, 0, 0, 0.5, 0, 0, 0]) == [0, 1, 2]
     assert marked("slip", [0.2] * 8) == [0, 1, 2, 3, 4, 5, 6]
+    # Every contact that slips too far has its own.
+    assert marked("slip", [0, 1.2, 0, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0, 0, 1.1]) == [0, 1, 2, 6, 7]
+    assert marked("slip", [0, 1.2, 0, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0, 0, 0.5]) == [0, 1, 2]
+    # What is too short to be halved stays as it is: then others must do.
     lengths[1] = 0.03
-    assert marked("slip", [0, 0.8, 0, 0, 0.5, 0, 0, 0]) == [0, 2]
+    assert marked("slip", [0, 0.8, 0, 0, 0.5, 0, 0, 0]) == [3, 4, 5]
 
 
 SPHERE = """\
