@@ -36,7 +36,8 @@ SMALL = Margin(friction=0.8, normal_force=0.25)
 FIRM = Margin(normal_force=2.0)
 REPLAYS = 12  # perturbed ones, that a certified design is tried on
 DROPS = 1  # of them; where more drop the object, a firmer grip is tried
-MOST_DROPS = 3  # where more do so then, too, another hand is; or where all do, if refining one is long
+MOST_DROPS = 3  # where more do so then, too, another hand is
+LONG_DROPS = 6  # likewise, where refining another takes minutes
 OUT_OF_REACH = 0.3  # half extents that a finger misses its contact by: nothing is left to refine
 SURELY = np.pi / 2  # that an object may turn so that contacts can surely go with it
 # What an exact motion misses only by how it goes between its samples; then it gets more of them.
@@ -83,7 +84,7 @@ class Certifier:
             for candidate in found.candidates[:HANDS_REFINED]:
                 judged, refined, drops = self._certify(candidate, found.short)
                 best = self.record.offer(judged, drops)
-                if serves(judged, drops, REPLAYS - 1 if self._begun[2] < 1 else MOST_DROPS):
+                if serves(judged, drops, LONG_DROPS if self._begun[2] < 1 else MOST_DROPS):
                     return best
                 if judged.status != "certified":
                     self.record.say("refine", f"not certified: {judged.reason}")
