@@ -84,7 +84,8 @@ class Certifier:
             for candidate in found.candidates[:HANDS_REFINED]:
                 judged, refined, drops = self._certify(candidate, found.short)
                 best = self.record.offer(judged, drops)
-                if serves(judged, drops, LONG_DROPS if self._begun[2] < 1 else MOST_DROPS):
+                _, _, share = self._begun
+                if serves(judged, drops, LONG_DROPS if share < 1 else MOST_DROPS):
                     return best
                 if judged.status != "certified":
                     self.record.say("refine", f"not certified: {judged.reason}")
@@ -268,7 +269,7 @@ def intervals_to_halve(found: Audit, lengths: Array) -> NDArray[np.bool_]:
         for run in figure.by_interval:
             gains = (1 - LEFT) * np.where(able, run, 0.0)
             largest = np.argsort(-gains, kind="stable")
-            # None where the run slips little, all where halving all of them is not enough.
+            # None where the run slips little, all that slip where halving all of them is not enough.
             needed = np.searchsorted(np.cumsum(gains[largest]), run.sum() - most)
             chosen = largest[: needed + 1 if run.sum() > most else 0]
             marked[chosen[gains[chosen] > 0]] = True

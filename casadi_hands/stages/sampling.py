@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 def resampled_model(model: Model, schedule: Schedule) -> Model:
-    """The task with other samples between the same keyframes; perturbations last until the next of its own."""
+    """The task with other samples between the same keyframes; a perturbation lasts to the next of its own samples."""
     was, now = model.schedule.samples, schedule.samples
     between, last = catmull_rom(was, now), held(was, now)
     quaternion = between @ continuous(model.palm_quaternion)

@@ -121,16 +121,16 @@ def slip_figure(folder: Folder, path: Trajectory) -> Figure:
     """
     motion = folder.motion
     worst = (0.0, "no contact slips")
-    runs = np.empty((0, len(motion.time) - 1))
+    runs = [np.zeros(len(motion.time) - 1)]
     for c, name in enumerate(motion.contact_names):
         steps = _slip_steps(folder, path, c)
         for first, last in active_runs(folder, c):
             slip = float(np.sum(steps[first:last]))
             words = f"contact '{name}' slips {{value}} between {motion.time[first]:.3g} s and {motion.time[last]:.3g} s"
             worst = max(worst, (slip, words))
-            inside = np.isin(np.arange(len(steps)), np.arange(first, last))
-            runs = np.vstack([runs, np.where(inside, steps, 0.0)])
-    return Figure("slip", worst[0], folder.task.limits.slip, "m", worst[1], by_interval=runs)
+            runs.append(np.zeros_like(steps))
+            runs[-1][first:last] = steps[first:last]
+    return Figure("slip", worst[0], folder.task.limits.slip, "m", worst[1], by_interval=np.array(runs))
 
 
 def spin_figure(folder: Folder, path: Trajectory) -> Figure:

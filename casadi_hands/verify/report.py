@@ -37,7 +37,7 @@ class Figure:
         finding: the worst case as a sentence with ``{value}`` in it.
         at_least: whether the limit is a least value rather than a largest one.
         by_interval: of a figure between samples, what each interval (S - 1,) has of it, in ``unit``; of slip
-            (runs, S - 1), of every stretch from touch to lift.
+            (runs, S - 1), of every stretch from touch to lift, after a row of zeros.
     """
 
     name: str

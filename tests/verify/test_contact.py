@@ -80,6 +80,9 @@ def test_bounce_opens_a_gap(tmp_path: Path) -> None:
     assert gap.text.endswith("at 0.5 s")
     between = gap_between_samples(folder, build_trajectory(folder, shoot(folder)))
     assert 1e-3 < between.value < 2.1e-3
+    assert between.by_interval is not None
+    assert between.by_interval.max() == between.value
+    assert set(np.flatnonzero(between.by_interval > 1e-3)) <= {4, 5}
 
 
 @pytest.mark.parametrize(("ball", "finger"), [(0.4, -2.0), (0.4, 0.0), (0.3, 1.0), (0.0, 1.5)])
@@ -88,6 +91,8 @@ def test_geared_bodies_slip_by_the_difference_of_arc_lengths(tmp_path: Path, bal
     slip = slip_figure(folder, build_trajectory(folder, shoot(folder)))
     # Outer gears run opposite: no slip when 30 mm · ball = -6 mm · finger.
     assert slip.value == pytest.approx(abs(0.03 * ball + TIP * finger), abs=2e-6)
+    assert slip.by_interval is not None
+    np.testing.assert_allclose(slip.by_interval.sum(axis=1).max(), slip.value, rtol=1e-9)
     assert gap_at_samples(folder, sample_placements(folder)).value < 1e-12
 
 
