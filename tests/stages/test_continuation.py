@@ -150,3 +150,15 @@ def test_a_motion_that_is_exact_but_for_its_samples_takes_the_last_step_alone(st
     told = Told(lambda coarse, share: True)
     assert told.renew(start).exact
     assert [(coarse, way) for coarse, way, *_ in told.taken] == [(False, "exact")]
+
+
+def test_where_a_small_barrier_leads_nowhere_a_larger_one_is_tried_but_once_for_a_firmer_grip(start: WholeHand) -> None:
+    for firmer, answers, exact in (
+        (False, [False, True], True),
+        (False, [False, False], False),
+        (True, [False], False),
+    ):
+        left = iter(answers)
+        told = Told(lambda coarse, share, left=left: next(left))  # type: ignore[misc]
+        assert told.renew(start, firmer=firmer).exact == exact
+        assert next(left, None) is None

@@ -56,6 +56,9 @@ def test_overlap_with_a_finger_is_the_segments_distance_less_the_radii(tmp_path:
     assert found.value == pytest.approx(0.03 + TIP - 0.035, abs=2e-6)
     assert "the object and finger 'left' (link 0)" in found.text
     assert found.text.endswith("at 0.45 s")
+    assert found.by_interval is not None
+    assert found.by_interval.max() == found.by_interval[4] == found.value
+    assert found.by_interval[0] < 0.5 * found.value
 
 
 def test_overlap_with_palm_and_ground(tmp_path: Path) -> None:
@@ -79,5 +82,8 @@ def test_joint_beyond_its_limit_and_its_speed(tmp_path: Path) -> None:
     beyond, speed = joint_figures(folder, build_trajectory(folder, shoot(folder)))
     assert beyond.value == pytest.approx(np.rad2deg(2.8) - 150.0, abs=1e-6)
     assert "finger1_joint0 of finger 'right'" in beyond.text
+    assert beyond.by_interval is not None
+    assert beyond.by_interval.max() == beyond.by_interval[-1] == beyond.value
+    assert beyond.by_interval[0] == 0
     assert speed.value == pytest.approx(2.8 * np.pi / 2 / 8, rel=1e-3)
     assert speed.holds
