@@ -7,7 +7,10 @@ sparse matrix-vector product.
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import casadi as ca
 import numpy as np
@@ -16,10 +19,11 @@ from casadi import DM, MX, SX, Function, Sparsity
 from numpy.typing import NDArray
 
 from casadi_hands.nlp.kernel import Kernel
-from casadi_hands.nlp.machine_code import compiled
+from casadi_hands.nlp.machine_code import Source, compiled
 
 Indices = NDArray[np.int64]
 _known: dict[str, KernelFunctions] = {}  # of this process, by what the kernel computes
+_ROLES = ("value", "gradient", "jacobian", "hessian", "patterns")
 
 
 def to_dm(matrix: sparse.sparray) -> DM:
@@ -28,7 +32,7 @@ def to_dm(matrix: sparse.sparray) -> DM:
     columns.sort_indices()
     height, width = matrix.shape
     pattern = Sparsity(height, width, columns.indptr.tolist(), columns.indices.tolist())
-    return DM(pattern, columns.data)
+    return DM(pattern, columns.data.tolist())  # CasADi takes lists three times as fast as arrays
 
 
 @dataclass(frozen=True)
@@ -54,37 +58,60 @@ class KernelFunctions:
     hessian_pattern: Sparsity
 
 
-def kernel_functions(kernel: Kernel, terms: list[str]) -> KernelFunctions:
-    """Differentiate a kernel; ``terms`` fixes the order of the weights. Kernels that compute the same share theirs."""
-    x, p = kernel.variables, kernel.parameters
-    weights = SX.sym("weights", len(terms))
-    values = ca.vertcat(*[kernel.terms[name] for name in terms]) if terms else SX.zeros(0, 1)
-    g = ca.vertcat(*kernel.constraints.values()) if kernel.constraints else SX.zeros(0, 1)
-    # What stands twice in them stands many times in their derivatives.
-    values, g = ca.cse([values, g])
-    value = Function("value", [x, p, weights], [ca.densify(values), ca.densify(g)])
-    same = value.serialize()
-    if same not in _known:
-        _known[same] = _differentiated(kernel.name, value, (x, p, weights), values, g)
-    return _known[same]
+class _Symbols:
+    """A kernel's terms and constraints as expressions of all its inputs; weights are in the order of its terms.
+
+    Attributes:
+        inputs: local variables, parameters and weights.
+        values: the terms.
+        g: the constraints.
+        value: (x, p, weights) -> (terms, g).
+        content: what ``value`` computes, as text.
+    """
+
+    def __init__(self, kernel: Kernel) -> None:
+        self.inputs = (kernel.variables, kernel.parameters, SX.sym("weights", len(kernel.terms)))
+        values = ca.vertcat(*kernel.terms.values()) if kernel.terms else SX.zeros(0, 1)
+        g = ca.vertcat(*kernel.constraints.values()) if kernel.constraints else SX.zeros(0, 1)
+        # What stands twice in them stands many times in their derivatives.
+        self.values, self.g = ca.cse([values, g])
+        self.value = Function("value", [*self.inputs], [ca.densify(self.values), ca.densify(self.g)])
+        self.content = self.value.serialize()
+
+    def differentiated(self) -> dict[str, Function]:
+        """Functions by role: those of ``KernelFunctions``, and ``patterns`` () -> zeros with its two patterns."""
+        x, _, weights = self.inputs
+        scale, multipliers = SX.sym("scale"), SX.sym("multipliers", self.g.numel())
+        total = ca.dot(weights, self.values) if self.values.numel() else SX(0)
+        jacobian = ca.jacobian(self.g, x)
+        hessian, _ = ca.hessian(scale * total + ca.dot(multipliers, self.g), x)
+        upper = ca.triu(hessian)
+        return {
+            "value": self.value,
+            "gradient": Function("gradient", [*self.inputs], [total, ca.densify(ca.gradient(total, x))]),
+            "jacobian": Function("jacobian", [*self.inputs], [ca.densify(self.g), _nonzeros(jacobian)]),
+            "hessian": Function("hessian", [*self.inputs, scale, multipliers], [_nonzeros(upper)]),
+            "patterns": Function("patterns", [], [SX(matrix.sparsity(), 0) for matrix in (jacobian, upper)]),
+        }
 
 
-def _differentiated(name: str, value: Function, inputs: tuple[SX, SX, SX], values: SX, g: SX) -> KernelFunctions:
-    x, _, weights = inputs
-    scale, multipliers = SX.sym("scale"), SX.sym("multipliers", g.numel())
-    total = ca.dot(weights, values) if values.numel() else SX(0)
-    jacobian = ca.jacobian(g, x)
-    hessian, _ = ca.hessian(scale * total + ca.dot(multipliers, g), x)
-    upper = ca.triu(hessian)
-    functions = {
-        "value": value,
-        "gradient": Function("gradient", [*inputs], [total, ca.densify(ca.gradient(total, x))]),
-        "jacobian": Function("jacobian", [*inputs], [ca.densify(g), _nonzeros(jacobian)]),
-        "hessian": Function("hessian", [*inputs, scale, multipliers], [_nonzeros(upper)]),
-    }
-    return KernelFunctions(
-        **compiled(name, functions), jacobian_pattern=jacobian.sparsity(), hessian_pattern=upper.sparsity()
-    )
+_symbols = cache(_Symbols)
+
+
+def kernel_functions(kernels: Sequence[Kernel]) -> list[KernelFunctions]:
+    """Differentiate kernels; those that compute the same share their functions."""
+    symbols = [_symbols(kernel) for kernel in kernels]
+    new = {s.content: (kernel.name, s) for kernel, s in zip(kernels, symbols, strict=True) if s.content not in _known}
+    sources = [
+        # What is compiled follows from the values and from how they are differentiated.
+        Source(name, content + inspect.getsource(_Symbols.differentiated), _ROLES, s.differentiated)
+        for content, (name, s) in new.items()
+    ]
+    for content, functions in zip(new, compiled(sources), strict=True):
+        jacobian, hessian = (functions["patterns"].sparsity_out(i) for i in range(2))
+        roles = {role: functions[role] for role in _ROLES if role != "patterns"}
+        _known[content] = KernelFunctions(**roles, jacobian_pattern=jacobian, hessian_pattern=hessian)
+    return [_known[s.content] for s in symbols]
 
 
 def _nonzeros(matrix: SX) -> SX:
@@ -144,16 +171,19 @@ def gather_nonzeros(
     """A sparse matrix whose nonzeros are fixed combinations of the entries of ``sources``, one for each part."""
     if not parts or all(len(part[0]) == 0 for part in parts):
         return MX(*shape)
-    keys = np.concatenate([column * shape[0] + row for row, column, _, _ in parts])
-    unique, position = np.unique(keys, return_inverse=True)
-    rows, columns = (unique % shape[0]).tolist(), unique // shape[0]
-    starts = np.searchsorted(columns, np.arange(shape[1] + 1)).tolist()
-    nonzeros, first = MX.zeros(len(unique), 1), 0
+    rows, columns = (np.concatenate([part[i] for part in parts]) for i in range(2))
+    # The pattern as a matrix whose entries are where its nonzeros stand: many times faster than sorting all.
+    pattern = sparse.csc_array((np.ones(len(rows), np.int8), (rows, columns)), shape=shape)
+    pattern.sort_indices()
+    place = sparse.csc_array((np.arange(pattern.nnz), pattern.indices, pattern.indptr), shape=shape)
+    position = np.asarray(place[rows, columns]).reshape(-1)
+    nonzeros, first = MX.zeros(pattern.nnz, 1), 0
     for (row, _, source, weight), values in zip(parts, sources, strict=True):
         target = position[first : first + len(row)]
         first += len(row)
         if len(row):
-            mix = sparse.csc_array((weight, (target, source)), shape=(len(unique), values.numel()))
+            mix = sparse.csc_array((weight, (target, source)), shape=(pattern.nnz, values.numel()))
             mix.sum_duplicates()
             nonzeros = nonzeros + ca.mtimes(MX(to_dm(mix)), values)
-    return MX(Sparsity(*shape, starts, rows), ca.densify(nonzeros))
+    sparsity = Sparsity(*shape, pattern.indptr.tolist(), pattern.indices.tolist())
+    return MX(sparsity, ca.densify(nonzeros))

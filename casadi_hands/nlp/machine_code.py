@@ -17,7 +17,9 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -27,7 +29,8 @@ from casadi import Function
 log = logging.getLogger(__name__)
 # No contraction of a*b+c: a compiled kernel rounds as the interpreted one does.
 _FLAGS = ("-fPIC", "-shared", "-ffp-contract=off")
-_LARGE = 20_000  # instructions beyond which full optimising takes longer than it will ever save
+_OPTIMISED = ("-O1", "-Og")  # the second beyond so many instructions: more takes longer than it will ever save
+_LARGE = 20_000
 _reported: set[type[Exception]] = set()
 
 
@@ -54,27 +57,67 @@ def cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache").absolute() / "casadi-hands"
 
 
-def compiled(name: str, functions: dict[str, Function]) -> dict[str, Function]:
-    """The same functions as machine code, or as they are where they cannot be compiled, kept or loaded.
+@dataclass(frozen=True)
+class Source:
+    """Functions of a kernel that are to be compiled.
 
-    Args:
+    Attributes:
         name: of the kernel, for the log.
-        functions: by role; each with a CasADi name of its own.
+        content: all that decides what the functions compute.
+        roles: their names.
+        write: gives them by role, each with its role as CasADi name; not called where a library is kept.
+    """
+
+    name: str
+    content: str
+    roles: Sequence[str]
+    write: Callable[[], dict[str, Function]]
+
+
+def compiled(sources: Sequence[Source]) -> list[dict[str, Function]]:
+    """Functions of each source as machine code, or as they are written where they cannot be compiled, kept or loaded.
+
+    What is in the cache is loaded; the rest is compiled at once, with a compiler for each processor.
     """
     c_compiler = compiler()
     if c_compiler is None:
-        return functions
-    flags = ("-Og" if sum(f.n_instructions() for f in functions.values()) > _LARGE else "-O1", *_FLAGS)
+        return [source.write() for source in sources]
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        # Threads only wait for compilers: CasADi's symbols are not made for several at once.
+        started = [_start(source, c_compiler, threads) for source in sources]
+        return [_loaded(source, library) for source, library in zip(sources, started, strict=True)]
+
+
+def _start(source: Source, c_compiler: str, threads: ThreadPoolExecutor) -> Future[Path]:
+    """The library that a source will have."""
+    library: Future[Path] = Future()
     try:
-        library = cache_folder() / f"{_key(functions, c_compiler, flags)}.so"
-        if not _intact(library):
-            library.parent.mkdir(parents=True, exist_ok=True)
-            with _locked(library.with_suffix(".lock")):
-                _build_unless_intact(name, functions, library, (c_compiler, *flags))
-        return {role: ca.external(function.name(), str(library)) for role, function in functions.items()}
+        path = cache_folder() / f"{_key(source.content, c_compiler)}.so"
+        if not _intact(path):
+            functions = source.write()
+            large = sum(function.n_instructions() for function in functions.values()) > _LARGE
+            command = (c_compiler, _OPTIMISED[large], *_FLAGS)
+            return threads.submit(_made, source.name, _c_code(functions), path, command)
+        library.set_result(path)
+    except (OSError, RuntimeError) as error:
+        library.set_exception(error)
+    return library
+
+
+def _made(name: str, c_code: str, library: Path, command: tuple[str, ...]) -> Path:
+    library.parent.mkdir(parents=True, exist_ok=True)
+    with _locked(library.with_suffix(".lock")):
+        _build_unless_intact(name, c_code, library, command)
+    return library
+
+
+def _loaded(source: Source, library: Future[Path]) -> dict[str, Function]:
+    try:
+        path = str(library.result())
+        return {role: ca.external(role, path) for role in source.roles}
     except (OSError, subprocess.SubprocessError, RuntimeError) as error:
-        _report(name, error)
-        return functions
+        _report(source.name, error)
+        return source.write()
 
 
 def _report(name: str, error: Exception) -> None:
@@ -88,10 +131,10 @@ def _report(name: str, error: Exception) -> None:
     log.log(level, "kernels are interpreted, which is several times slower; '%s': %s", name, words)
 
 
-def _key(functions: dict[str, Function], c_compiler: str, flags: tuple[str, ...]) -> str:
+def _key(content: str, c_compiler: str) -> str:
     """Name of a library: a hash of all that decides what is in it and whether it can run here."""
-    sources = [function.serialize() for function in functions.values()]
-    return hashlib.sha256("|".join([*sources, *flags, _toolchain(c_compiler)]).encode()).hexdigest()[:24]
+    parts = (content, *_FLAGS, *_OPTIMISED, str(_LARGE), _toolchain(c_compiler))
+    return hashlib.sha256("|".join(parts).encode()).hexdigest()[:24]
 
 
 @cache
@@ -115,7 +158,7 @@ def _intact(library: Path) -> bool:
         return False
 
 
-def _build_unless_intact(name: str, functions: dict[str, Function], library: Path, command: tuple[str, ...]) -> None:
+def _build_unless_intact(name: str, c_code: str, library: Path, command: tuple[str, ...]) -> None:
     """Build a library, unless another process did while this one waited for the lock."""
     if _intact(library):
         return
@@ -124,23 +167,27 @@ def _build_unless_intact(name: str, functions: dict[str, Function], library: Pat
     for left in library.parent.glob(f"{library.stem}-*"):
         # Of a process that was killed while it built.
         shutil.rmtree(left, ignore_errors=True)
-    _build(functions, library, command)
+    _build(c_code, library, command)
 
 
-def _build(functions: dict[str, Function], library: Path, command: tuple[str, ...]) -> None:
+def _c_code(functions: dict[str, Function]) -> str:
+    generator = ca.CodeGenerator("kernel.c")
+    for function in functions.values():
+        generator.add(function)
+    return str(generator.dump())
+
+
+def _build(c_code: str, library: Path, command: tuple[str, ...]) -> None:
     """Write C, compile it, and put the record and the library in place.
 
     Raises:
         OSError: the folder cannot be written, or the compiler not be started.
         subprocess.CalledProcessError: the compiler failed.
     """
-    generator = ca.CodeGenerator("kernel.c")
-    for function in functions.values():
-        generator.add(function)
     with tempfile.TemporaryDirectory(dir=library.parent, prefix=f"{library.stem}-") as scratch:
         source, built, record = (Path(scratch) / f"kernel.{suffix}" for suffix in ("c", "so", "sha256"))
         # CasADi's own writing does not notice a full disk.
-        source.write_text(generator.dump())
+        source.write_text(c_code)
         arguments = [*command, source.name, "-o", built.name, "-lm"]
         subprocess.run(arguments, cwd=scratch, check=True, capture_output=True, text=True, errors="replace")
         record.write_bytes(_record(built, library.name))

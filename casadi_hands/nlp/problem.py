@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -36,7 +37,22 @@ class _Bound:
     parameters: NDArray[np.int64]
     count: int
     first_row: int
+
+
+@dataclass(frozen=True)
+class _Called:
+    """A kernel's functions and what all its instances give them: local variables, parameters and weights, by column."""
+
+    bound: _Bound
     functions: KernelFunctions
+    variables: MX
+    parameters: MX
+    weights: MX
+
+    def mapped(self, role: str, *more: MX) -> Any:
+        """A function of the kernel for all instances."""
+        function: Function = getattr(self.functions, role)
+        return function.map(self.bound.count)(self.variables, self.parameters, self.weights, *more)
 
 
 class Problem:
@@ -111,8 +127,7 @@ class Problem:
             if f"weight.{term}" not in self.parameters:
                 self.parameters.add(f"weight.{term}", (1,))
         weights = np.array([self.parameters[f"weight.{term}"][0] for term in terms], int)
-        functions = kernel_functions(kernel, terms)
-        self._bound.append(_Bound(kernel, terms, weights, selector, positions, count, first, functions))
+        self._bound.append(_Bound(kernel, terms, weights, selector, positions, count, first))
 
     def _constrain(self, kernel: Kernel, count: int, bounds: Mapping[str, tuple[ArrayLike, ArrayLike]]) -> None:
         """Reserve the kernel's constraint rows, instance after instance, and set their bounds."""
@@ -139,9 +154,10 @@ class Problem:
         """Functions ``nlp`` (x, p) -> (f, g), ``grad_f``, ``jac_g``, ``hess_lag`` for nlpsol, and ``terms``."""
         x, p = MX.sym("x", self.variables.size), MX.sym("p", self.parameters.size)
         scale, multipliers = MX.sym("lam_f"), MX.sym("lam_g", self.constraints.size)
-        inputs = [self._inputs(bound, x, p) for bound in self._bound]
-        values = [b.functions.value.map(b.count)(*i) for b, i in zip(self._bound, inputs, strict=True)]
-        gradients = [b.functions.gradient.map(b.count)(*i) for b, i in zip(self._bound, inputs, strict=True)]
+        kernels = kernel_functions([bound.kernel for bound in self._bound])
+        called = [_Called(b, k, *self._inputs(b, x, p)) for b, k in zip(self._bound, kernels, strict=True)]
+        values = [each.mapped("value") for each in called]
+        gradients = [each.mapped("gradient") for each in called]
         f = sum((ca.sum2(total) for total, _ in gradients), MX(0))
         g = ca.vertcat(*[ca.vec(v[1]) for v in values if v[1].numel()]) if self.constraints.size else MX.zeros(0, 1)
         gradient = sum(
@@ -152,11 +168,11 @@ class Problem:
         return {
             "nlp": Function("nlp", [x, p], [f, g], ["x", "p"], ["f", "g"]),
             "grad_f": Function("nlp_grad_f", [x, p], [f, gradient], ["x", "p"], ["f", "grad_f_x"]),
-            "jac_g": Function("nlp_jac_g", [x, p], [g, self._jacobian(inputs)], ["x", "p"], ["g", "jac_g_x"]),
+            "jac_g": Function("nlp_jac_g", [x, p], [g, self._jacobian(called)], ["x", "p"], ["g", "jac_g_x"]),
             "hess_lag": Function(
                 "nlp_hess_l",
                 [x, p, scale, multipliers],
-                [self._hessian(inputs, scale, multipliers)],
+                [self._hessian(called, scale, multipliers)],
                 ["x", "p", "lam_f", "lam_g"],
                 ["triu_hess_gamma_x_x"],
             ),
@@ -179,26 +195,26 @@ class Problem:
                 totals[name] = totals[name] + p[int(bound.weights[i])] * sums[i]
         return ca.vertcat(*totals.values())
 
-    def _jacobian(self, inputs: list[tuple[MX, MX, MX]]) -> MX:
+    def _jacobian(self, called: list[_Called]) -> MX:
         parts, sources = [], []
-        for bound, arguments in zip(self._bound, inputs, strict=True):
-            pattern = bound.functions.jacobian_pattern
+        for each in called:
+            bound, pattern = each.bound, each.functions.jacobian_pattern
             if pattern.nnz():
                 parts.append(scatter_jacobian(bound.selector, bound.count, pattern, bound.first_row))
-                sources.append(ca.vec(bound.functions.jacobian.map(bound.count)(*arguments)[1]))
+                sources.append(ca.vec(each.mapped("jacobian")[1]))
         return gather_nonzeros((self.constraints.size, self.variables.size), parts, sources)
 
-    def _hessian(self, inputs: list[tuple[MX, MX, MX]], scale: MX, multipliers: MX) -> MX:
+    def _hessian(self, called: list[_Called], scale: MX, multipliers: MX) -> MX:
         parts, sources = [], []
-        for bound, arguments in zip(self._bound, inputs, strict=True):
-            pattern = bound.functions.hessian_pattern
+        for each in called:
+            bound, pattern = each.bound, each.functions.hessian_pattern
             if pattern.nnz():
-                width = bound.functions.jacobian_pattern.size1()
+                width = each.functions.jacobian_pattern.size1()
                 local = multipliers[bound.first_row : bound.first_row + width * bound.count]
                 local = ca.reshape(local, width, bound.count) if width else MX.zeros(0, bound.count)
                 scales = ca.repmat(scale, 1, bound.count)
                 parts.append(scatter_hessian(bound.selector, bound.count, pattern))
-                sources.append(ca.vec(bound.functions.hessian.map(bound.count)(*arguments, scales, local)))
+                sources.append(ca.vec(each.mapped("hessian", scales, local)))
         return gather_nonzeros((self.variables.size, self.variables.size), parts, sources)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import casadi as ca
 from casadi import SX
@@ -82,6 +83,7 @@ class Scene:
         return Touch(on_link, off_object, off_link, normal, from_end / norm(from_end, 1e-6), rotation, here)
 
 
+@cache
 def contact(joints: int, index: int, limited: bool) -> Kernel:
     """One touching contact at one knot: on both surfaces, normals opposed, in the cone, supplied by the joints.
 
@@ -106,6 +108,7 @@ def contact(joints: int, index: int, limited: bool) -> Kernel:
     return kernel
 
 
+@cache
 def held(joints: int, index: int, limited: bool) -> Kernel:
     """A second force of a touching contact at one knot: in the cone, and supplied by the joints, as the first."""
     kernel = Kernel(f"held{index}")
@@ -136,6 +139,7 @@ def _hold(kernel: Kernel, touch: Touch, force: SX, friction: SX, limited: bool) 
     return pressing, across, passive
 
 
+@cache
 def rolling(joints: int, index: int) -> Kernel:
     """One contact from one knot to the next: its paths over both surfaces agree (no slip), and its spin costs."""
     kernel = Kernel(f"rolling{index}")
@@ -163,6 +167,7 @@ def rolling(joints: int, index: int) -> Kernel:
     return kernel
 
 
+@cache
 def apart(
     joints: int, primitives: int, index: int, touched: int | None, grounded: bool, between: bool = False
 ) -> Kernel:
@@ -206,6 +211,7 @@ def apart(
     return kernel
 
 
+@cache
 def fingers_apart(joints: int, other_joints: int, tag: str) -> Kernel:
     """Two fingers clear of each other at one time."""
     kernel = Kernel(f"fingers_apart{tag}")
@@ -220,6 +226,7 @@ def fingers_apart(joints: int, other_joints: int, tag: str) -> Kernel:
     return kernel
 
 
+@cache
 def joint_motion(joints: int, index: int, limited: bool) -> Kernel:
     """One finger's angles at three knots: smooth, and within the speed limit if there is one."""
     kernel = Kernel(f"joint_motion{index}")
@@ -231,6 +238,7 @@ def joint_motion(joints: int, index: int, limited: bool) -> Kernel:
     return kernel
 
 
+@cache
 def joint_jerk(joints: int, index: int) -> Kernel:
     """How the acceleration of one finger's joints changes over four knots.
 
@@ -242,6 +250,7 @@ def joint_jerk(joints: int, index: int) -> Kernel:
     return kernel
 
 
+@cache
 def stay(joints: int, index: int) -> Kernel:
     """A finger's morphology: short, on the palm, and near what the synthesis found."""
     kernel = Kernel(f"stay{index}")

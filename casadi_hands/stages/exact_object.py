@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import casadi as ca
 from casadi import SX
 from numpy.polynomial.legendre import leggauss
@@ -16,6 +18,7 @@ from casadi_hands.stages.surface import path_between, smooth_surface
 _GAUSS, _GAUSS_WEIGHTS = (leggauss(3)[0] + 1) / 2, leggauss(3)[1] / 2
 
 
+@cache
 def wrench(contacts: int) -> Kernel:
     """The contacts' force and torque at a knot, as variables of their own: physics then knows no contacts."""
     kernel = Kernel("wrench")
@@ -25,6 +28,7 @@ def wrench(contacts: int) -> Kernel:
     return kernel
 
 
+@cache
 def middle_torque(contacts: int) -> Kernel:
     """The contacts' torque halfway between two knots, with forces and points linear in the object's frame."""
     kernel = Kernel("middle_torque")
@@ -45,6 +49,7 @@ def _torque(points: SX, forces: SX) -> SX:
     return sum((ca.cross(points[:, i], forces[:, i]) for i in range(points.shape[1])), SX.zeros(3, 1))
 
 
+@cache
 def physics() -> Kernel:
     """Newton–Euler from one knot to the next; forces and contact points linear in the object's frame.
 
@@ -111,6 +116,7 @@ def _quintic(start: tuple[SX, SX, SX], end: tuple[SX, SX, SX], s: float) -> SX:
     )
 
 
+@cache
 def pushed(contacts: int) -> Kernel:
     """Second forces at a knot that, with an external push, make the same wrench as the first ones alone."""
     kernel = Kernel("pushed")
@@ -125,6 +131,7 @@ def pushed(contacts: int) -> Kernel:
     return kernel
 
 
+@cache
 def equilibrium() -> Kernel:
     """The contacts' wrench that holds the object still at one knot: a motion starts and ends without a jolt."""
     kernel = Kernel("equilibrium")
@@ -135,6 +142,7 @@ def equilibrium() -> Kernel:
     return kernel
 
 
+@cache
 def object_jerk() -> Kernel:
     """How the object's acceleration changes over three knots.
 
@@ -146,6 +154,7 @@ def object_jerk() -> Kernel:
     return kernel
 
 
+@cache
 def force_change(contacts: int) -> Kernel:
     """Change of the contact forces from one knot to the next."""
     kernel = Kernel("force_change")
@@ -154,6 +163,7 @@ def force_change(contacts: int) -> Kernel:
     return kernel
 
 
+@cache
 def stay_on_path() -> Kernel:
     """The object near the motion of the whole-hand stage at one knot."""
     kernel = Kernel("stay_path")
@@ -162,6 +172,7 @@ def stay_on_path() -> Kernel:
     return kernel
 
 
+@cache
 def meet_goal() -> Kernel:
     """The object's distance (6,) from a goal; the tolerance is there for where it is needed, not to be used up."""
     kernel = Kernel("meet_goal")
@@ -170,6 +181,7 @@ def meet_goal() -> Kernel:
     return kernel
 
 
+@cache
 def ground_contact() -> Kernel:
     """The object's contact with the ground at one knot; the ground's normal is the world's z.
 
@@ -195,6 +207,7 @@ def ground_contact() -> Kernel:
     return kernel
 
 
+@cache
 def ground_held() -> Kernel:
     """A second force in the ground's cone at one knot."""
     kernel = Kernel("ground_held")
@@ -211,6 +224,7 @@ def _hold(kernel: Kernel, exerted: SX, friction: SX) -> None:
     kernel.constrain("cone", (friction * exerted[2]) ** 2 - ca.sumsqr(exerted[:2]))
 
 
+@cache
 def ground_rolling() -> Kernel:
     """The object's contact with the ground from one knot to the next: it rolls or stands, and does not slip."""
     kernel = Kernel("ground_rolling")
@@ -233,6 +247,7 @@ def ground_rolling() -> Kernel:
     return kernel
 
 
+@cache
 def object_apart(primitives: int, grounded: bool) -> Kernel:
     """The object clear of the palm, and above the ground if there is one, at one knot."""
     kernel = Kernel("object_apart")
@@ -257,6 +272,7 @@ def object_apart(primitives: int, grounded: bool) -> Kernel:
     return kernel
 
 
+@cache
 def tool_point() -> Kernel:
     """How far (3,) the object's tool is from where it must be at one knot of a drawing."""
     kernel = Kernel("tool_point")

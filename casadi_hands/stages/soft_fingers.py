@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import casadi as ca
 from casadi import SX
 
@@ -19,6 +21,7 @@ def given_morphology(kernel: Kernel, joints: int, tag: str = "") -> FingerSymbol
     return morphology(kernel.parameter, frames, joints, tag)
 
 
+@cache
 def touch(joints: int, moves: bool) -> Kernel:
     """One finger and its contact at one sample (Table 2.4): all that ties the contact to the finger."""
     kernel = Kernel("touch")
@@ -50,6 +53,7 @@ def touch(joints: int, moves: bool) -> Kernel:
     return kernel
 
 
+@cache
 def move(joints: int) -> Kernel:
     """One finger's joints at one sample: eq. 2.26 for all tips, and eq. 2.27 as a plain square outside the limits."""
     kernel = Kernel("move")
@@ -62,6 +66,7 @@ def move(joints: int) -> Kernel:
     return kernel
 
 
+@cache
 def object_clearance(joints: int, primitives: int, moves: bool) -> Kernel:
     """One finger against object, palm, ground and itself at one sample (eq. 2.20)."""
     kernel = Kernel("object_clearance")
@@ -105,6 +110,7 @@ def distances(
     return ca.vertcat(*apart), clearance.links_and_object(ends[-1:], radius, primitives)
 
 
+@cache
 def finger_clearance(joints: int, other_joints: int) -> Kernel:
     """Two fingers against each other at one sample (eq. 2.20)."""
     kernel = Kernel("finger_clearance")
@@ -116,6 +122,7 @@ def finger_clearance(joints: int, other_joints: int) -> Kernel:
     return kernel
 
 
+@cache
 def palm_motion() -> Kernel:
     """A moving palm at one keyframe: acceleration of its offset, and a weak pull to the given motion."""
     kernel = Kernel("palm_motion")

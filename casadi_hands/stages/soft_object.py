@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import casadi as ca
 from casadi import SX
 
@@ -41,6 +43,7 @@ class Palm:
         return ca.mtimes(rotation_matrix(conjugate(self.quaternion)), vector)
 
 
+@cache
 def dynamics(contacts: int, suffix: str = "", regularise: bool = True) -> Kernel:
     """Newton–Euler at one sample (eq. 2.5, 2.6) and the object's accelerations (eq. 2.14, 2.15).
 
@@ -78,6 +81,7 @@ def dynamics(contacts: int, suffix: str = "", regularise: bool = True) -> Kernel
     return kernel
 
 
+@cache
 def contact_forces(suffix: str = "", tag: str = "") -> Kernel:
     """One finger contact at one sample: eq. 2.7, 2.8, 2.10, 2.12 and the slip they miss.
 
@@ -103,6 +107,7 @@ def contact_forces(suffix: str = "", tag: str = "") -> Kernel:
     return kernel
 
 
+@cache
 def contact_motion() -> Kernel:
     """Where one contact point goes: eq. 2.13, and a weak pull to the user's patch."""
     kernel = Kernel("contact_motion")
@@ -113,6 +118,7 @@ def contact_motion() -> Kernel:
     return kernel
 
 
+@cache
 def ground_contact(suffix: str = "") -> Kernel:
     """The contact of object and ground at one sample (section 3.1); its normal is the world's z."""
     kernel = Kernel("ground" + suffix)
@@ -142,6 +148,7 @@ def ground_contact(suffix: str = "") -> Kernel:
     return kernel
 
 
+@cache
 def goal_pose() -> Kernel:
     """The task term at one goal (eq. 2.9)."""
     kernel = Kernel("goal")
@@ -153,6 +160,7 @@ def goal_pose() -> Kernel:
     return kernel
 
 
+@cache
 def goal_point() -> Kernel:
     """The task term of a drawing at one sample of its path (fig. 3.4)."""
     kernel = Kernel("goal")
@@ -164,6 +172,7 @@ def goal_point() -> Kernel:
     return kernel
 
 
+@cache
 def straight_path() -> Kernel:
     """One keyframe's distance (6,) from the straight way between goals: lengths and rad.
 
@@ -180,6 +189,7 @@ def capsule_in(pose_position: SX, rotation: SX, capsule: SX) -> tuple[SX, SX]:
     return pose_position + ca.mtimes(rotation, capsule[:3]), pose_position + ca.mtimes(rotation, capsule[3:6])
 
 
+@cache
 def palm_clearance(moves: bool) -> Kernel:
     """One primitive of the object against palm and ground at one sample (section 3.2.3)."""
     kernel = Kernel("palm_clearance")
@@ -198,6 +208,7 @@ def palm_clearance(moves: bool) -> Kernel:
     return kernel
 
 
+@cache
 def enough_contacts(contacts: int) -> Kernel:
     """The sum of the contact invariants at one keyframe, to be bounded below."""
     kernel = Kernel("enough_contacts")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 
 import casadi as ca
 import numpy as np
@@ -238,6 +239,7 @@ class SynthesisStage:
         )
 
 
+@cache
 def _follow(joints: int) -> Kernel:
     """One finger at one keyframe: eq. 2.18, 2.23, 2.24 and 2.27."""
     kernel = Kernel("follow")
@@ -257,6 +259,7 @@ def _follow(joints: int) -> Kernel:
     return kernel
 
 
+@cache
 def _build(joints: int) -> Kernel:
     """One finger's shape: eq. 2.21, 2.22 and 2.25."""
     kernel = Kernel("build")
@@ -270,6 +273,7 @@ def _build(joints: int) -> Kernel:
     return kernel
 
 
+@cache
 def _collide(joints: int, primitives: int) -> Kernel:
     """One finger against object, palm, ground and itself at one time (eq. 2.20)."""
     kernel = Kernel("collide")
@@ -292,6 +296,7 @@ def _collide(joints: int, primitives: int) -> Kernel:
     return kernel
 
 
+@cache
 def _keep_apart(joints: int, other_joints: int) -> Kernel:
     """Two fingers against each other at one time (eq. 2.20)."""
     kernel = Kernel("keep_apart")
@@ -306,6 +311,7 @@ def _keep_apart(joints: int, other_joints: int) -> Kernel:
     return kernel
 
 
+@cache
 def _travel(joints: int) -> Kernel:
     """A fingertip's acceleration at a keyframe where it touches nothing (eq. 2.26)."""
     kernel = Kernel("travel")

@@ -21,7 +21,7 @@ from casadi import SX, Function
 
 from casadi_hands.nlp import Kernel, machine_code
 from casadi_hands.nlp.assembly import kernel_functions
-from casadi_hands.nlp.machine_code import cache_folder, compiled, compiler
+from casadi_hands.nlp.machine_code import cache_folder, compiler
 from casadi_hands.stages import exact_fingers
 from casadi_hands.stages.soft_object import dynamics
 
@@ -83,6 +83,12 @@ def wave(shift: float = 0.0) -> dict[str, Function]:
     }
 
 
+def compiled(name: str, functions: dict[str, Function]) -> dict[str, Function]:
+    """Some functions under a kernel's name."""
+    content = "".join(function.serialize() for function in functions.values())
+    return machine_code.compiled([machine_code.Source(name, content, list(functions), lambda: functions)])[0]
+
+
 def numbers(functions: dict[str, Function], x: Array) -> Array:
     return np.asarray(functions["first"](x)).ravel()
 
@@ -108,16 +114,19 @@ def kernels() -> list[Kernel]:
 def test_machine_code_gives_the_very_numbers_of_the_interpreter(
     kernel: Kernel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    terms = list(kernel.terms)
     monkeypatch.setattr("casadi_hands.nlp.assembly._known", {})
-    fast = kernel_functions(kernel, terms)
-    assert kernel_functions(kernel, terms) is fast
+    (fast,) = kernel_functions([kernel])
+    assert kernel_functions([kernel, kernel]) == [fast, fast]
+    monkeypatch.setattr("casadi_hands.nlp.assembly._known", {})
+    (kept,) = kernel_functions([kernel])  # now without differentiating anything
     monkeypatch.setattr("casadi_hands.nlp.machine_code.compiler", lambda: None)
     monkeypatch.setattr("casadi_hands.nlp.assembly._known", {})
-    slow = kernel_functions(kernel, terms)
+    (slow,) = kernel_functions([kernel])
+    for pattern in ("jacobian_pattern", "hessian_pattern"):
+        assert getattr(fast, pattern) == getattr(kept, pattern) == getattr(slow, pattern)
     rng = np.random.default_rng(3)
     for role in ("value", "gradient", "jacobian", "hessian"):
-        one, other = getattr(fast, role), getattr(slow, role)
+        one, other = getattr(kept, role), getattr(slow, role)
         assert is_compiled({role: one})
         assert not is_compiled({role: other})
         for _ in range(20):
@@ -140,6 +149,31 @@ def test_a_kernel_is_compiled_once(counting: Compiler) -> None:
     x = np.array([0.3, -0.2, 0.9])
     np.testing.assert_allclose(numbers(other, x), np.sin(x) * np.linalg.norm(x) + 1, rtol=1e-15)
     np.testing.assert_allclose(numbers(compiled("wave", wave()), x), np.sin(x) * np.linalg.norm(x))
+
+
+def test_kernels_in_the_cache_are_not_written_again() -> None:
+    compiled("wave", wave())
+    content = "".join(function.serialize() for function in wave().values())
+
+    def write() -> dict[str, Function]:
+        raise AssertionError("written again")
+
+    (again,) = machine_code.compiled([machine_code.Source("wave", content, ("first", "second"), write)])
+    x = np.array([0.3, -0.2, 0.9])
+    np.testing.assert_allclose(numbers(again, x), np.sin(x) * np.linalg.norm(x))
+
+
+def test_kernels_are_compiled_at_once(counting: Compiler, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Each compiler waits for the other to have begun.
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    begun = counting.path.parent / "begun"
+    lines = counting.path.read_text().splitlines()
+    wait = f"echo . >> {begun}; for i in $(seq 300); do [ $(wc -l < {begun}) = 2 ] && break; sleep 0.1; done"
+    together = f"[ $(wc -l < {begun}) = 2 ] || exit 1"
+    counting.path.write_text("\n".join([*lines[:-2], wait, together, lines[-1]]) + "\n")
+    functions = [wave(shift) for shift in (0.0, 1.0)]
+    sources = [machine_code.Source("wave", f["first"].serialize(), list(f), lambda f=f: f) for f in functions]
+    assert all(is_compiled(each) for each in machine_code.compiled(sources))
 
 
 def test_nothing_but_libraries_stays_in_the_cache(cache: Path) -> None:
@@ -194,8 +228,9 @@ def test_the_compilers_own_words_are_passed_on(
 PROGRAM = f"""
 import casadi as ca
 from casadi import SX, Function
-from casadi_hands.nlp.machine_code import compiled
+from casadi_hands.nlp import machine_code
 {inspect.getsource(wave)}
+{inspect.getsource(compiled)}
 for shift in (0.0, 1.0):
     function = compiled("wave", wave(shift))["first"]
     print(not function.is_a("SXFunction"), *function([0.3, -0.2, 0.9]).nonzeros())
