@@ -8,6 +8,7 @@ import pytest
 
 from casadi_hands.design import Design
 from casadi_hands.errors import DesignError
+from casadi_hands.export.folder import save_design
 from casadi_hands.task import parse_task
 from tests.export.example import TASK, example_design
 
@@ -43,6 +44,11 @@ def record(folder):
 
 def test_a_folder_holds_every_file(saved):
     assert {path.name for path in saved.iterdir()} == FILES
+
+
+def test_a_page_is_left_out_where_nobody_looks_at_it(saved):
+    save_design(example_design(), saved, page=False)
+    assert {path.name for path in saved.iterdir()} == FILES - {"viewer.html"}
 
 
 def test_a_design_comes_back_as_it_was(saved):

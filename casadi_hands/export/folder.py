@@ -19,7 +19,7 @@ _FILES = ("task.yaml", "hand.urdf", "object.urdf", "scene.xml", "motion.npz", "r
 _ENTRIES = ("status", "reason", "hand", "samples", "costs", "certificate", "stages", "seconds")
 
 
-def save_design(design: Design, directory: Path) -> None:
+def save_design(design: Design, directory: Path, page: bool = True) -> None:
     """Write a design's folder; of a partial design, the files for which there is something to write.
 
     Files of an earlier design in the folder are replaced or removed. ``result.json`` comes last, so a folder that has
@@ -28,6 +28,7 @@ def save_design(design: Design, directory: Path) -> None:
     Args:
         design: whole or partial (hand or motion None).
         directory: made if it does not exist.
+        page: write the viewer too, which takes longer than all the rest.
 
     Raises:
         DesignError: the folder cannot be written, or the design holds what cannot be.
@@ -38,12 +39,12 @@ def save_design(design: Design, directory: Path) -> None:
         directory.mkdir(parents=True, exist_ok=True)
         for name in _FILES:
             (directory / name).unlink(missing_ok=True)
-        _write(design, directory)
+        _write(design, directory, page)
     except OSError as error:
         raise DesignError(f"{directory}: cannot write the design here: {error}") from error
 
 
-def _write(design: Design, directory: Path) -> None:
+def _write(design: Design, directory: Path, page: bool) -> None:
     texts = {"task.yaml": task_to_yaml(design.task), "object.urdf": object_urdf(design.task)}
     if design.hand is not None:
         texts["hand.urdf"] = hand_urdf(design.hand)
@@ -53,7 +54,8 @@ def _write(design: Design, directory: Path) -> None:
         (directory / name).write_text(text, encoding="utf-8")
     if design.motion is not None:
         save_motion(design.motion, directory / "motion.npz")
-    write_page(design, directory / "viewer.html")
+    if page:
+        write_page(design, directory / "viewer.html")
     (directory / "result.json").write_text(record_text(design_record(design)), encoding="utf-8")
 
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable
 from functools import cached_property, partial
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from casadi_hands.design import Design
 from casadi_hands.errors import HandsError
+from casadi_hands.export.folder import save_design
 from casadi_hands.pipeline.judge import Judge
 from casadi_hands.pipeline.record import Record
 from casadi_hands.pipeline.refine_reason import failing_fingers, refined_reason
@@ -233,7 +235,7 @@ class Refiner:
         try:
             load_mujoco()
             with self.record.stage("refine", "replays of the certified motion"), tempfile.TemporaryDirectory() as files:
-                design.save(files)
+                save_design(design, Path(files), page=False)
                 if replay(files).dropped:
                     return REPLAYS
                 return sum(r.dropped for r in replay_many(files, REPLAYS, jobs=self.jobs))

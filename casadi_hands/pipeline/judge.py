@@ -6,9 +6,11 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
-from casadi_hands.design import Design
+from casadi_hands.design import Design, Hand, Motion
+from casadi_hands.export.folder import save_design
 from casadi_hands.pipeline.words import friction_reason, missed_figures, speed_reason, torque_reason
 from casadi_hands.reasons import Reason, tell
 from casadi_hands.stages.floating import Floating
@@ -38,6 +40,7 @@ class Judge:
 
     def __init__(self, model: Model, floating: Floating) -> None:
         self.model, self.floating = model, floating
+        self._last: tuple[Hand | None, Motion | None, Audit] | None = None
 
     @cached_property
     def _friction(self) -> Reason | None:
@@ -63,10 +66,12 @@ class Judge:
         return replace(design, status="feasible" if possible else "failed", reason=reason, certificate=certificate)
 
     def audited(self, design: Design) -> Audit:
-        """What the audit finds in a design's files."""
-        with tempfile.TemporaryDirectory() as scratch:
-            design.save(scratch)
-            return audit(scratch)
+        """What the audit finds in a design's files; of the same hand and motion as the last time, what it found."""
+        if self._last is None or self._last[0] is not design.hand or self._last[1] is not design.motion:
+            with tempfile.TemporaryDirectory() as scratch:
+                save_design(design, Path(scratch), page=False)
+                self._last = design.hand, design.motion, audit(scratch)
+        return self._last[2]
 
     def _feasible(self, name: str, figure: dict[str, Any]) -> bool:
         limit = FEASIBLE[name] * (self.model.units.length if name in _LENGTHS else 1.0)

@@ -119,37 +119,35 @@ def _miss(
     folder: Folder, loads: Loads, start: Rotation, end: Rotation, rate: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return by how much (K, 3) the shots miss the next orientation, and its Jacobian (K, 3, 3) in the launch rate."""
-
-    def miss(at: np.ndarray) -> np.ndarray:
-        turn: np.ndarray = (end.inv() * _integrate(folder, loads, start, at)[3]).as_rotvec()
-        return turn
-
-    value, step = miss(rate), 1e-4
-    columns = [(miss(rate + step * unit) - miss(rate - step * unit)) / (2 * step) for unit in np.eye(3)]
-    return value, np.stack(columns, axis=-1)
+    step = 1e-4
+    # All seven shots of an interval at once: many small arrays take longer than a large one.
+    rates = rate + step * np.vstack([np.zeros((1, 3)), np.eye(3), -np.eye(3)])[:, None]
+    arrived = _integrate(folder, loads, start, rates)[3]
+    miss = (end.inv() * arrived).as_rotvec()
+    return miss[0], np.moveaxis((miss[1:4] - miss[4:]) / (2 * step), 0, -1)
 
 
 def _integrate(
     folder: Folder, loads: Loads, start: Rotation, rate: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, Rotation]:
-    """Integrate all intervals at once from rest at the origin with launch rates (K, 3).
+    """Integrate all intervals at once from rest at the origin with launch rates (..., K, 3).
 
     Returns:
-        distance travelled (K, 3) and velocity gained (K, 3) in the world, arrival rate (K, 3), arrival orientation.
+        distance travelled and velocity gained in the world, arrival rate, each as ``rate``, and arrival orientation.
     """
     mass, inertia = folder.object.mass, folder.object.inertia
     inverse, fastest = np.linalg.inv(inertia), FASTEST / loads.time[:, None]
 
     def slope(fraction: float, state: np.ndarray) -> np.ndarray:
-        velocity, quaternion, omega = state[:, 3:6], state[:, 6:10], np.clip(state[:, 10:13], -fastest, fastest)
+        velocity, quaternion, omega = state[..., 3:6], state[..., 6:10], np.clip(state[..., 10:13], -fastest, fastest)
         turn = Rotation.from_quat(quaternion, scalar_first=True)
         force, moment, external_force, external_torque = loads.at(fraction)
         acceleration = folder.gravity + (turn.apply(force) + external_force) / mass
         torque = moment + turn.apply(external_torque, inverse=True) - np.cross(omega, omega @ inertia)
-        return np.concatenate([velocity, acceleration, _quaternion_rate(quaternion, omega), torque @ inverse], axis=1)
+        return np.concatenate([velocity, acceleration, _quaternion_rate(quaternion, omega), torque @ inverse], axis=-1)
 
-    count = len(rate)
-    state = np.concatenate([np.zeros((count, 6)), start.as_quat(scalar_first=True), rate], axis=1)
+    quaternion = np.broadcast_to(start.as_quat(scalar_first=True), (*rate.shape[:-1], 4))
+    state = np.concatenate([np.zeros((*rate.shape[:-1], 6)), quaternion, rate], axis=-1)
     step, share = loads.time[:, None] / SUBSTEPS, 1.0 / SUBSTEPS
     for i in range(SUBSTEPS):
         at = i * share
@@ -158,13 +156,14 @@ def _integrate(
         k3 = slope(at + share / 2, state + step / 2 * k2)
         k4 = slope(at + share, state + step * k3)
         state = state + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-    return state[:, :3], state[:, 3:6], state[:, 10:13], Rotation.from_quat(state[:, 6:10], scalar_first=True)
+    return state[..., :3], state[..., 3:6], state[..., 10:13], Rotation.from_quat(state[..., 6:10], scalar_first=True)
 
 
 def _quaternion_rate(quaternion: np.ndarray, omega: np.ndarray) -> np.ndarray:
-    """Return dq/dt (K, 4) of unit quaternions [w, x, y, z] turning at body rates (K, 3)."""
-    w, v = quaternion[:, :1], quaternion[:, 1:]
-    return 0.5 * np.concatenate([-np.sum(v * omega, axis=1, keepdims=True), w * omega + np.cross(v, omega)], axis=1)
+    """Return dq/dt (..., 4) of unit quaternions [w, x, y, z] turning at body rates (..., 3)."""
+    w, v = quaternion[..., :1], quaternion[..., 1:]
+    turned = -np.sum(v * omega, axis=-1, keepdims=True)
+    return 0.5 * np.concatenate([turned, w * omega + np.cross(v, omega)], axis=-1)
 
 
 def sample_residual(folder: Folder, shots: Shots) -> tuple[np.ndarray, np.ndarray]:
