@@ -42,8 +42,8 @@ class KernelFunctions:
     Sparse results are columns of their nonzeros, with the patterns given here.
 
     Attributes:
-        value: (x, p, weights) -> (terms, g).
-        gradient: (x, p, weights) -> (weighted sum of the terms, its gradient).
+        value: (x, p, weights) -> (weighted sum of the terms, terms, g).
+        gradient: (x, p, weights) -> (weighted sum, its gradient).
         jacobian: (x, p, weights) -> (g, nonzeros of its Jacobian).
         hessian: (x, p, weights, scale, multipliers) -> nonzeros of the Lagrangian's upper Hessian.
         jacobian_pattern: of one instance.
@@ -65,7 +65,8 @@ class _Symbols:
         inputs: local variables, parameters and weights.
         values: the terms.
         g: the constraints.
-        value: (x, p, weights) -> (terms, g).
+        total: the weighted sum of the terms.
+        value: (x, p, weights) -> (total, terms, g).
         content: what ``value`` computes, as text.
     """
 
@@ -75,14 +76,14 @@ class _Symbols:
         g = ca.vertcat(*kernel.constraints.values()) if kernel.constraints else SX.zeros(0, 1)
         # What stands twice in them stands many times in their derivatives.
         self.values, self.g = ca.cse([values, g])
-        self.value = Function("value", [*self.inputs], [ca.densify(self.values), ca.densify(self.g)])
+        self.total = ca.dot(self.inputs[2], self.values) if self.values.numel() else SX(0)
+        self.value = Function("value", [*self.inputs], [self.total, ca.densify(self.values), ca.densify(self.g)])
         self.content = self.value.serialize()
 
     def differentiated(self) -> dict[str, Function]:
         """Functions by role: those of ``KernelFunctions``, and ``patterns`` () -> zeros with its two patterns."""
-        x, _, weights = self.inputs
+        x, total = self.inputs[0], self.total
         scale, multipliers = SX.sym("scale"), SX.sym("multipliers", self.g.numel())
-        total = ca.dot(weights, self.values) if self.values.numel() else SX(0)
         jacobian = ca.jacobian(self.g, x)
         hessian, _ = ca.hessian(scale * total + ca.dot(multipliers, self.g), x)
         upper = ca.triu(hessian)
@@ -165,6 +166,12 @@ def scatter_hessian(
     return row[keep], column[keep], sources[keep], weight[keep]
 
 
+def combined(matrix: sparse.csr_array, values: MX) -> MX:
+    """A constant matrix times a column; what only picks entries does no arithmetic."""
+    picks = np.all(np.diff(matrix.indptr) == 1) and np.all(matrix.data == 1)
+    return values[matrix.indices.tolist()] if picks else ca.mtimes(MX(to_dm(matrix)), values)
+
+
 def gather_nonzeros(
     shape: tuple[int, int], parts: list[tuple[Indices, Indices, Indices, NDArray[np.float64]]], sources: list[MX]
 ) -> MX:
@@ -177,13 +184,9 @@ def gather_nonzeros(
     pattern.sort_indices()
     place = sparse.csc_array((np.arange(pattern.nnz), pattern.indices, pattern.indptr), shape=shape)
     position = np.asarray(place[rows, columns]).reshape(-1)
-    nonzeros, first = MX.zeros(pattern.nnz, 1), 0
-    for (row, _, source, weight), values in zip(parts, sources, strict=True):
-        target = position[first : first + len(row)]
-        first += len(row)
-        if len(row):
-            mix = sparse.csc_array((weight, (target, source)), shape=(pattern.nnz, values.numel()))
-            mix.sum_duplicates()
-            nonzeros = nonzeros + ca.mtimes(MX(to_dm(mix)), values)
+    first = np.cumsum([0, *[values.numel() for values in sources]])
+    source = np.concatenate([part[2] + start for part, start in zip(parts, first[:-1], strict=True)])
+    weight = np.concatenate([part[3] for part in parts])
+    mix = sparse.csr_array((weight, (position, source)), shape=(pattern.nnz, first[-1]))
     sparsity = Sparsity(*shape, pattern.indptr.tolist(), pattern.indices.tolist())
-    return MX(sparsity, ca.densify(nonzeros))
+    return MX(sparsity, combined(mix, ca.vertcat(*sources)))

@@ -14,11 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from casadi_hands.nlp.assembly import (
     KernelFunctions,
+    combined,
     gather_nonzeros,
     kernel_functions,
     scatter_hessian,
     scatter_jacobian,
-    to_dm,
 )
 from casadi_hands.nlp.kernel import Kernel
 from casadi_hands.nlp.layout import Layout, Rows
@@ -158,16 +158,17 @@ class Problem:
         called = [_Called(b, k, *self._inputs(b, x, p)) for b, k in zip(self._bound, kernels, strict=True)]
         values = [each.mapped("value") for each in called]
         gradients = [each.mapped("gradient") for each in called]
-        f = sum((ca.sum2(total) for total, _ in gradients), MX(0))
-        g = ca.vertcat(*[ca.vec(v[1]) for v in values if v[1].numel()]) if self.constraints.size else MX.zeros(0, 1)
-        gradient = sum(
-            (ca.mtimes(MX(to_dm(b.selector.T)), ca.vec(v[1])) for b, v in zip(self._bound, gradients, strict=True)),
-            MX.zeros(x.numel(), 1),
-        )
-        terms = self._term_values([v[0] for v in values], p)
+        f = sum((ca.sum2(total) for total, _, _ in values), MX(0))
+        g = ca.vertcat(*[ca.vec(g) for _, _, g in values if g.numel()]) if self.constraints.size else MX.zeros(0, 1)
+        gradient = MX.zeros(x.numel(), 1)
+        if called:
+            spread = sparse.csr_array(sparse.vstack([bound.selector for bound in self._bound]).T)
+            gradient = combined(spread, ca.vertcat(*[ca.vec(slope) for _, slope in gradients]))
+        same_f = sum((ca.sum2(total) for total, _ in gradients), MX(0))
+        terms = self._term_values([v[1] for v in values], p)
         return {
             "nlp": Function("nlp", [x, p], [f, g], ["x", "p"], ["f", "g"]),
-            "grad_f": Function("nlp_grad_f", [x, p], [f, gradient], ["x", "p"], ["f", "grad_f_x"]),
+            "grad_f": Function("nlp_grad_f", [x, p], [same_f, gradient], ["x", "p"], ["f", "grad_f_x"]),
             "jac_g": Function("nlp_jac_g", [x, p], [g, self._jacobian(called)], ["x", "p"], ["g", "jac_g_x"]),
             "hess_lag": Function(
                 "nlp_hess_l",
@@ -180,7 +181,7 @@ class Problem:
         }
 
     def _inputs(self, bound: _Bound, x: MX, p: MX) -> tuple[MX, MX, MX]:
-        local = ca.reshape(ca.mtimes(MX(to_dm(bound.selector)), x), -1, bound.count)
+        local = ca.reshape(combined(bound.selector, x), -1, bound.count)
         positions = bound.parameters.reshape(-1).tolist()
         parameters = ca.reshape(p[positions], -1, bound.count) if positions else MX.zeros(0, bound.count)
         weights = ca.repmat(p[bound.weights.tolist()], 1, bound.count) if bound.terms else MX.zeros(0, bound.count)
