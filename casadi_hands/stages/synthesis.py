@@ -17,7 +17,8 @@ from casadi_hands.stages.target import Target
 from casadi_hands.terms import clearance, finger
 
 Array = NDArray[np.float64]
-OPTIONS = Options(max_iter=150, tol=1e-3, acceptable_tol=1e-2)
+# All but the first step start near their minimum, which a larger barrier leaves first.
+OPTIONS = Options(max_iter=150, tol=1e-3, acceptable_tol=1e-2, mu_init=1e-3)
 BETWEEN = 2  # collision samples between neighbouring keyframes
 AXIS_RANGE = 2.2  # rad, how far an axis may turn from its seed
 MARGIN = 0.03  # clearance asked of bodies that need not touch, half extents
