@@ -20,6 +20,7 @@ from os import environ
 from pathlib import Path
 
 import numpy as np
+from evaluated import FUNCTIONS, evaluation
 from isolated import Outcome, isolated
 from peers import Attempt, Build, Method, Posed, Run, by_scipy, opti, ours, recorded_solves
 from profiled import KINDS, cores_used, profiled_solve
@@ -59,7 +60,9 @@ PEERS = (
     "times slower in all",
     "MB",
 )
-SPENT = ("task", "stage", "s", "solves", "iterations", *(f"{kind} %" for kind in KINDS), "Python and the rest %")
+EVALUATED = ("task", "stage", *(f"{name}: ms / in a loop" for name in FUNCTIONS))
+MEDIANS = ("stage", "optimiser", "times slower to its own objective", "times slower in all", "tasks")
+SPENT = ("task", "stage", "s", "solves", "iterations", *(f"{kind} %" for kind in KINDS), "Python and files %")
 
 
 @dataclass(frozen=True)
@@ -81,20 +84,27 @@ def main() -> None:
     parser.add_argument("--limit", type=float, default=20.0, help="s for each solve of a peer")
     parser.add_argument("--peers", action=BooleanOptionalAction, default=True, help="compare optimisers")
     parser.add_argument("--profile", action=BooleanOptionalAction, default=True, help="profile whole solves")
+    parser.add_argument("--evaluation", action=BooleanOptionalAction, default=True, help="time functions alone")
     parser.add_argument("--out", type=Path, default=Path("results/benchmark"), help="folder for tables and chart")
     given = parser.parse_args()
     comparisons: list[list[str]] = []
     spent: list[list[str]] = []
+    evaluated: list[list[str]] = []
     for task in given.tasks:
         if given.peers:
             search = {"joints": given.joints, "trials": given.trials}
             for pose in (pose_floating, partial(pose_finger, **search), partial(pose_hand, **search)):
                 comparisons += compare(pose, task, given.limit)
                 write_table(PEERS, comparisons, given.out / "peers.md")
+        if given.evaluation:
+            evaluated += evaluations(task)
+            write_table(EVALUATED, evaluated, given.out / "evaluation.md")
         if given.profile:
             spent += spending(task)
             write_table(SPENT, spent, given.out / "profile.md")
             print(two_processes(task))
+    if given.peers:
+        write_table(MEDIANS, medians(comparisons), given.out / "medians.md")
     print(f"cold start: {cold_start(given.tasks[0])}")
 
 
@@ -188,6 +198,36 @@ def compared(ended: Outcome[Run], reference: Run, limit: float, same_problem: bo
         f"{in_all:.3g}",
         f"{ended.megabytes:.0f}",
     ]
+
+
+def medians(rows: Sequence[Sequence[str]]) -> list[list[str]]:
+    """Over the tasks, of each optimiser in each stage, from the rows of ``PEERS``; what never ended is not counted."""
+    table = []
+    for stage, name in dict.fromkeys((row[1], row[2]) for row in rows):
+        same = [dict(zip(PEERS, row, strict=True)) for row in rows if (row[1], row[2]) == (stage, name)]
+        ended = [row for row in same if row["times slower in all"] != NOTHING]
+        cells = []
+        for column in MEDIANS[2:4]:
+            values = [float(row[column]) for row in ended if row[column] != NOTHING]
+            cells.append(f"{np.median(values):.3g}" if values else NOTHING)
+        table.append([stage, name, *cells, str(len(ended))])
+    return table
+
+
+def evaluations(task_file: Path) -> list[list[str]]:
+    """Rows of the table of functions' times, whole and of their kernels alone."""
+    outcome = isolated(evaluation, task_file, limit=3600)
+    name = load_task(task_file).name
+    if outcome.value is None:
+        return [[name, outcome.failure, *[NOTHING] * len(FUNCTIONS)]]
+    rows = []
+    for stage, seconds in outcome.value.items():
+        cells = []
+        for function in FUNCTIONS:
+            whole, loop = seconds.get(function, (0.0, 0.0))
+            cells.append(f"{1e3 * whole:.2f} / {whole / loop:.2f}" if loop else NOTHING)
+        rows.append([name, stage, *cells])
+    return rows
 
 
 def slowness(theirs: Attempt, our: Attempt) -> float:

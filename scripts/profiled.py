@@ -13,15 +13,16 @@ from unittest.mock import patch
 
 from casadi_hands import load_task, solve
 from casadi_hands.nlp import Options, Solution, Solver
-from casadi_hands.pipeline import Progress
+from casadi_hands.pipeline import Progress, certify
 from casadi_hands.stages.floating import FloatingStage
 from casadi_hands.stages.refine import RefineStage
 from casadi_hands.stages.synthesis import SynthesisStage
 from casadi_hands.stages.whole_hand import WholeHandStage
 
-KINDS = ("building", "value", "gradient", "Jacobian", "Hessian", "rest of IPOPT")
+KINDS = ("building", "value", "gradient", "Jacobian", "Hessian", "rest of IPOPT", "replays")
 _CALLED = {"value": ("nlp_f", "nlp_g"), "gradient": ("nlp_grad_f",), "Jacobian": ("nlp_jac_g",)}
 _CALLED["Hessian"] = ("nlp_hess_l",)
+_REPLAYS = ("replay", "replay_many")
 Seconds = dict[str, dict[str, float]]
 
 
@@ -40,7 +41,7 @@ class Ledger:
         self.seconds: Seconds = defaultdict(lambda: defaultdict(float))
         self.iterations: dict[str, int] = defaultdict(int)
         self.solves: dict[str, int] = defaultdict(int)
-        self._building = 0
+        self._timing = 0
 
     @contextmanager
     def open(self) -> Iterator[Ledger]:
@@ -49,6 +50,7 @@ class Ledger:
         patches = [patch.object(stage, "__init__", self._timed(stage.__init__)) for stage in stages]
         patches += [patch.object(Solver, "nlpsol", self._timed(Solver.nlpsol))]
         patches += [patch.object(Solver, "solve", self._booked(Solver.solve))]
+        patches += [patch.object(certify, name, self._timed(getattr(certify, name), "replays")) for name in _REPLAYS]
         for each in patches:
             each.start()
         try:
@@ -57,16 +59,16 @@ class Ledger:
             for each in patches:
                 each.stop()
 
-    def _timed(self, function: Callable[..., Any]) -> Callable[..., Any]:
+    def _timed(self, function: Callable[..., Any], kind: str = "building") -> Callable[..., Any]:
         def timed(*given: Any, **named: Any) -> Any:
-            self._building += 1
+            self._timing += 1
             began = time.perf_counter()
             try:
                 return function(*given, **named)
             finally:
-                self._building -= 1
-                if not self._building:
-                    self.seconds[self.stage]["building"] += time.perf_counter() - began
+                self._timing -= 1
+                if not self._timing:
+                    self.seconds[self.stage][kind] += time.perf_counter() - began
 
         return timed
 

@@ -8,15 +8,18 @@ import time
 from multiprocessing.connection import Connection
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 import pytest
-from benchmark import PEERS, SPENT, compared, reached, shares, slowness
+from benchmark import MEDIANS, PEERS, SPENT, compared, medians, reached, shares, slowness
+from evaluated import _compared, _loops
 from growth import ITERATIONS, Size, exponent, measure, task_of
 from isolated import Outcome, isolated
 from peers import Attempt, Run, recorded_solves
 from profiled import KINDS, Ledger, processor_time
 
 from casadi_hands import load_task
+from casadi_hands.nlp.assembly import kernel_functions
 from casadi_hands.stages.floating import FloatingStage
 from casadi_hands.stages.model import build_model
 
@@ -56,6 +59,35 @@ def test_rows_of_optimisers() -> None:
     assert len(compared(Outcome(None, "the process died", 0, 7.0), Run(0.4, [OUR]), 3.0, True)) == len(row)
 
 
+def test_medians_are_of_what_ended() -> None:
+    ended = [
+        [task, "1", "BFGS", *["x"] * 6, own, in_all, "90"]
+        for task, own, in_all in (("a", "3", "10"), ("b", "5", "40"), ("c", "9", "20"))
+    ]
+    other = ["a", "2", "BFGS", "stopped after 3 s", *["–"] * 8]
+    assert medians([*ended, other]) == [["1", "BFGS", "5", "20", "3"], ["2", "BFGS", "–", "–", "0"]]
+    assert len(MEDIANS) == 5
+
+
+def test_functions_and_loops_of_kernels_compute_the_same() -> None:
+    task = load_task(TASK)
+    with recorded_solves() as posed:
+        stage = FloatingStage(build_model(task))
+        stage.solve(dict(task.weights.floating))
+    solver, x, p = stage.solver, posed[0].start, posed[0].parameters
+    kernels = kernel_functions([bound.kernel for bound in solver.problem._bound])
+    multipliers = np.zeros(solver.problem.constraints.size)
+    loops = _loops(solver.problem, kernels, "value", x, p, multipliers)
+    total = 0.0
+    for loop, inputs in loops:
+        shaped = [ca.reshape(ca.DM(each), *loop.size_in(i)) for i, each in enumerate(inputs)]
+        total += float(ca.sum(loop.call(shaped)[0]))
+    assert total == pytest.approx(float(solver.functions["nlp"](x, p)[0]), rel=1e-12)
+    seconds = _compared(solver, x, p)
+    assert list(seconds) == ["value", "gradient", "Jacobian", "Hessian"]
+    assert all(whole > 0 and loop > 0 for whole, loop in seconds.values())
+
+
 def test_shares_are_of_the_whole_with_the_rest_last() -> None:
     cells = shares({"building": 1.0, "Hessian": 2.0}, 8.0)
     assert len(SPENT) == 5 + len(cells)
@@ -78,7 +110,7 @@ def test_the_ledger_books_each_second_once() -> None:
     solving = sum(solution.seconds for solution in solutions)
     assert booked.pop("building") > 0
     assert sum(booked.values()) == pytest.approx(solving, rel=1e-9)
-    assert all(0 < booked[kind] < solving for kind in KINDS[1:])
+    assert all(0 < booked[kind] < solving for kind in KINDS[1:-1])  # no replays yet
     assert ledger.iterations["floating"] == sum(solution.iterations for solution in solutions)
     assert ledger.solves["floating"] == len(solutions)
     FloatingStage(build_model(task))

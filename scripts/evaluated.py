@@ -1,0 +1,118 @@
+"""What a stage's functions cost beside the same kernels, compiled with more optimising and called in a plain loop."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from casadi_hands import load_task, solve
+from casadi_hands.nlp import Problem, Solver, assembly, machine_code
+from casadi_hands.nlp.assembly import KernelFunctions, kernel_functions
+
+Vector = NDArray[np.float64]
+FUNCTIONS = {"value": "nlp", "gradient": "grad_f", "Jacobian": "jac_g", "Hessian": "hess_lag"}
+REPEATS, CALLS = 7, 20
+
+
+def evaluation(task_file: Path) -> dict[str, dict[str, tuple[float, float]]]:
+    """Seconds of one evaluation: stage -> function -> (of the whole problem, of its kernels alone in a loop).
+
+    Each stage's largest problem, where its first solve started. The loop gets what kernels read, and what they return
+    is not put together.
+    """
+    posed: dict[str, tuple[Solver, Vector, Vector]] = {}
+    stage = ""
+
+    def hear(news: Any) -> None:
+        nonlocal stage
+        stage = news.stage
+
+    original = Solver.solve
+
+    def solved(solver: Solver, start: Any, parameters: Any, *rest: Any, **named: Any) -> Any:
+        size = solver.problem.variables.size
+        if stage not in posed or size > posed[stage][0].problem.variables.size:
+            x = solver.problem.variables.pack(start, np.zeros(size))
+            p = solver.problem.parameters.pack(parameters, np.zeros(solver.problem.parameters.size))
+            posed[stage] = solver, x, p
+        return original(solver, start, parameters, *rest, **named)
+
+    with patch.object(Solver, "solve", solved):
+        solve(load_task(task_file), seed=0, jobs=1, progress=hear)
+    return {name: _compared(*each) for name, each in posed.items()}
+
+
+def _compared(solver: Solver, x: Vector, p: Vector) -> dict[str, tuple[float, float]]:
+    problem = solver.problem
+    multipliers = np.random.default_rng(0).normal(size=problem.constraints.size)
+    with _optimised():
+        kernels = kernel_functions([bound.kernel for bound in problem._bound])
+    seconds = {}
+    for name, function in FUNCTIONS.items():
+        if name == "Jacobian" and not problem.constraints.size:
+            continue
+        more = [np.ones(1), multipliers] if name == "Hessian" else []
+        ours = _seconds(solver.functions[function], [x, p, *more])
+        loops = _loops(problem, kernels, name.lower(), x, p, multipliers)
+        seconds[name] = ours, sum(_seconds(loop, inputs) for loop, inputs in loops)
+    return seconds
+
+
+def _loops(
+    problem: Problem, kernels: Sequence[KernelFunctions], role: str, x: Vector, p: Vector, multipliers: Vector
+) -> list[tuple[ca.Function, list[Vector]]]:
+    """Each kernel's function for all its instances, with what they read."""
+    loops = []
+    for bound, kernel in zip(problem._bound, kernels, strict=True):
+        if (role == "hessian" and not kernel.hessian_pattern.nnz()) or (role == "jacobian" and not _rows(kernel)):
+            continue
+        inputs = [bound.selector @ x, p[bound.parameters].reshape(-1), np.tile(p[bound.weights], bound.count)]
+        if role == "hessian":
+            count = _rows(kernel) * bound.count
+            inputs += [np.ones(bound.count), multipliers[bound.first_row : bound.first_row + count]]
+        loops.append((getattr(kernel, role).map(bound.count), inputs))
+    return loops
+
+
+def _rows(kernel: KernelFunctions) -> int:
+    return int(kernel.jacobian_pattern.size1())
+
+
+@contextmanager
+def _optimised() -> Any:
+    """Kernels compiled with -O2 meanwhile, whatever their size."""
+    with (
+        patch.object(machine_code, "_OPTIMISED", ("-O2", "-O2")),
+        patch.object(assembly, "_known", {}),
+    ):
+        yield
+
+
+def _seconds(function: ca.Function, inputs: Sequence[Vector]) -> float:
+    """Of one call, the least of some repeated measurements."""
+    buffer, call = function.buffer()
+    arrays = [np.ascontiguousarray(each, float) for each in inputs]
+    results = [np.zeros(function.nnz_out(i)) for i in range(function.n_out())]
+    for index, array in enumerate(arrays):
+        assert array.size == function.nnz_in(index)
+        if array.size:
+            buffer.set_arg(index, memoryview(array))
+    for index, array in enumerate(results):
+        if array.size:
+            buffer.set_res(index, memoryview(array))
+    call()
+    best = np.inf
+    for _ in range(REPEATS):
+        began = time.perf_counter()
+        for _ in range(CALLS):
+            call()
+        best = min(best, (time.perf_counter() - began) / CALLS)
+    return float(best)
