@@ -60,7 +60,7 @@ PEERS = (
     "times slower in all",
     "MB",
 )
-EVALUATED = ("task", "stage", *(f"{name}: ms / in a loop" for name in FUNCTIONS))
+EVALUATED = ("task", "stage", *(f"{name}: ms, times its kernels in a loop" for name in FUNCTIONS))
 MEDIANS = ("stage", "optimiser", "times slower to its own objective", "times slower in all", "tasks")
 SPENT = ("task", "stage", "s", "solves", "iterations", *(f"{kind} %" for kind in KINDS), "Python and files %")
 
@@ -96,6 +96,7 @@ def main() -> None:
             for pose in (pose_floating, partial(pose_finger, **search), partial(pose_hand, **search)):
                 comparisons += compare(pose, task, given.limit)
                 write_table(PEERS, comparisons, given.out / "peers.md")
+            write_table(MEDIANS, medians(comparisons), given.out / "medians.md")
         if given.evaluation:
             evaluated += evaluations(task)
             write_table(EVALUATED, evaluated, given.out / "evaluation.md")
@@ -103,8 +104,6 @@ def main() -> None:
             spent += spending(task)
             write_table(SPENT, spent, given.out / "profile.md")
             print(two_processes(task))
-    if given.peers:
-        write_table(MEDIANS, medians(comparisons), given.out / "medians.md")
     print(f"cold start: {cold_start(given.tasks[0])}")
 
 
@@ -225,7 +224,7 @@ def evaluations(task_file: Path) -> list[list[str]]:
         cells = []
         for function in FUNCTIONS:
             whole, loop = seconds.get(function, (0.0, 0.0))
-            cells.append(f"{1e3 * whole:.2f} / {whole / loop:.2f}" if loop else NOTHING)
+            cells.append(f"{1e3 * whole:.2f}, {whole / loop:.2f}" if loop else NOTHING)
         rows.append([name, stage, *cells])
     return rows
 

@@ -12,6 +12,7 @@ from unittest.mock import patch
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
+from peers import Posed, recorded_solves
 
 from casadi_hands import load_task, solve
 from casadi_hands.nlp import Problem, Solver, assembly, machine_code
@@ -28,26 +29,26 @@ def evaluation(task_file: Path) -> dict[str, dict[str, tuple[float, float]]]:
     Each stage's largest problem, where its first solve started. The loop gets what kernels read, and what they return
     is not put together.
     """
-    posed: dict[str, tuple[Solver, Vector, Vector]] = {}
+    largest: dict[str, tuple[Solver, Posed]] = {}
     stage = ""
 
     def hear(news: Any) -> None:
         nonlocal stage
         stage = news.stage
 
-    original = Solver.solve
+    with recorded_solves() as posed:
+        recorded = Solver.solve
 
-    def solved(solver: Solver, start: Any, parameters: Any, *rest: Any, **named: Any) -> Any:
-        size = solver.problem.variables.size
-        if stage not in posed or size > posed[stage][0].problem.variables.size:
-            x = solver.problem.variables.pack(start, np.zeros(size))
-            p = solver.problem.parameters.pack(parameters, np.zeros(solver.problem.parameters.size))
-            posed[stage] = solver, x, p
-        return original(solver, start, parameters, *rest, **named)
+        def solved(solver: Solver, *given: Any, **named: Any) -> Any:
+            solution = recorded(solver, *given, **named)
+            size = solver.problem.variables.size
+            if stage not in largest or size > largest[stage][0].problem.variables.size:
+                largest[stage] = solver, posed[-1]
+            return solution
 
-    with patch.object(Solver, "solve", solved):
-        solve(load_task(task_file), seed=0, jobs=1, progress=hear)
-    return {name: _compared(*each) for name, each in posed.items()}
+        with patch.object(Solver, "solve", solved):
+            solve(load_task(task_file), seed=0, jobs=1, progress=hear)
+    return {name: _compared(solver, each.start, each.parameters) for name, (solver, each) in largest.items()}
 
 
 def _compared(solver: Solver, x: Vector, p: Vector) -> dict[str, tuple[float, float]]:

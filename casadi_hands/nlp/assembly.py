@@ -7,7 +7,7 @@ sparse matrix-vector product.
 
 from __future__ import annotations
 
-import inspect
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -23,7 +23,8 @@ from casadi_hands.nlp.machine_code import Source, compiled
 
 Indices = NDArray[np.int64]
 _known: dict[str, KernelFunctions] = {}  # of this process, by what the kernel computes
-_ROLES = ("value", "gradient", "jacobian", "hessian", "patterns")
+_ROLES = ("value", "gradient", "jacobian", "hessian")
+_REVISION = "1"  # of how kernels are differentiated: compiled ones are kept by it and by what they compute
 
 
 def to_dm(matrix: sparse.sparray) -> DM:
@@ -67,7 +68,7 @@ class _Symbols:
         g: the constraints.
         total: the weighted sum of the terms.
         value: (x, p, weights) -> (total, terms, g).
-        content: what ``value`` computes, as text.
+        content: a hash of what ``value`` computes, and of how it is differentiated.
     """
 
     def __init__(self, kernel: Kernel) -> None:
@@ -78,7 +79,7 @@ class _Symbols:
         self.values, self.g = ca.cse([values, g])
         self.total = ca.dot(self.inputs[2], self.values) if self.values.numel() else SX(0)
         self.value = Function("value", [*self.inputs], [self.total, ca.densify(self.values), ca.densify(self.g)])
-        self.content = self.value.serialize()
+        self.content = hashlib.sha256(f"{_REVISION}|{self.value.serialize()}".encode()).hexdigest()
 
     def differentiated(self) -> dict[str, Function]:
         """Functions by role: those of ``KernelFunctions``, and ``patterns`` () -> zeros with its two patterns."""
@@ -96,22 +97,21 @@ class _Symbols:
         }
 
 
-_symbols = cache(_Symbols)
+_symbols = cache(_Symbols)  # a kernel is complete once it is bound
 
 
 def kernel_functions(kernels: Sequence[Kernel]) -> list[KernelFunctions]:
     """Differentiate kernels; those that compute the same share their functions."""
     symbols = [_symbols(kernel) for kernel in kernels]
     new = {s.content: (kernel.name, s) for kernel, s in zip(kernels, symbols, strict=True) if s.content not in _known}
-    sources = [
-        # What is compiled follows from the values and from how they are differentiated.
-        Source(name, content + inspect.getsource(_Symbols.differentiated), _ROLES, s.differentiated)
-        for content, (name, s) in new.items()
-    ]
+    sources = [Source(name, s.content, (*_ROLES, "patterns"), s.differentiated) for name, s in new.values()]
     for content, functions in zip(new, compiled(sources), strict=True):
-        jacobian, hessian = (functions["patterns"].sparsity_out(i) for i in range(2))
-        roles = {role: functions[role] for role in _ROLES if role != "patterns"}
-        _known[content] = KernelFunctions(**roles, jacobian_pattern=jacobian, hessian_pattern=hessian)
+        patterns = functions["patterns"]
+        _known[content] = KernelFunctions(
+            **{role: functions[role] for role in _ROLES},
+            jacobian_pattern=patterns.sparsity_out(0),
+            hessian_pattern=patterns.sparsity_out(1),
+        )
     return [_known[s.content] for s in symbols]
 
 
@@ -169,7 +169,8 @@ def scatter_hessian(
 def combined(matrix: sparse.csr_array, values: MX) -> MX:
     """A constant matrix times a column; what only picks entries does no arithmetic."""
     picks = np.all(np.diff(matrix.indptr) == 1) and np.all(matrix.data == 1)
-    return values[matrix.indices.tolist()] if picks else ca.mtimes(MX(to_dm(matrix)), values)
+    # Of a single entry CasADi picks a row.
+    return ca.vec(values[matrix.indices.tolist()]) if picks else ca.mtimes(MX(to_dm(matrix)), values)
 
 
 def gather_nonzeros(

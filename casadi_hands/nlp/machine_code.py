@@ -18,7 +18,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -77,47 +77,60 @@ class Source:
 def compiled(sources: Sequence[Source]) -> list[dict[str, Function]]:
     """Functions of each source as machine code, or as they are written where they cannot be compiled, kept or loaded.
 
-    What is in the cache is loaded; the rest is compiled at once, with a compiler for each processor.
+    What is in the cache is loaded; the rest is compiled side by side, with a compiler for each processor.
     """
     c_compiler = compiler()
     if c_compiler is None:
         return [source.write() for source in sources]
-    with ThreadPoolExecutor(os.cpu_count()) as threads:
-        # Threads only wait for compilers: CasADi's symbols are not made for several at once.
-        started = [_start(source, c_compiler, threads) for source in sources]
-        return [_loaded(source, library) for source, library in zip(sources, started, strict=True)]
-
-
-def _start(source: Source, c_compiler: str, threads: ThreadPoolExecutor) -> Future[Path]:
-    """The library that a source will have."""
-    library: Future[Path] = Future()
+    # Threads only wait for compilers: CasADi's symbols are not made for several at once.
+    threads = ThreadPoolExecutor(_processors())
     try:
-        path = cache_folder() / f"{_key(source.content, c_compiler)}.so"
-        if not _intact(path):
-            functions = source.write()
-            large = sum(function.n_instructions() for function in functions.values()) > _LARGE
-            command = (c_compiler, _OPTIMISED[large], *_FLAGS)
-            return threads.submit(_made, source.name, _c_code(functions), path, command)
-        library.set_result(path)
+        begun = [_begun(source, c_compiler, threads) for source in sources]
+        return [finish() for finish in begun]
+    finally:
+        # At once where the user interrupts; else nothing is left to wait for.
+        threads.shutdown(wait=False, cancel_futures=True)
+
+
+def _processors() -> int:
+    """How many processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _begun(source: Source, c_compiler: str, threads: ThreadPoolExecutor) -> Callable[[], dict[str, Function]]:
+    """Load a source's library or start to compile it; what is returned gives its functions."""
+    try:
+        library = cache_folder() / f"{_key(source.content, c_compiler)}.so"
+        if _intact(library):
+            loaded = _load(source, library)
+            return lambda: loaded
     except (OSError, RuntimeError) as error:
-        library.set_exception(error)
-    return library
+        _report(source.name, error)
+        return source.write
+    functions = source.write()
+    large = sum(function.n_instructions() for function in functions.values()) > _LARGE
+    command = (c_compiler, _OPTIMISED[large], *_FLAGS)
+    made = threads.submit(_make, source.name, _c_code(functions), library, command)
+
+    def finish() -> dict[str, Function]:
+        try:
+            made.result()
+            return _load(source, library)
+        except (OSError, subprocess.SubprocessError, RuntimeError) as error:
+            _report(source.name, error)
+            return functions
+
+    return finish
 
 
-def _made(name: str, c_code: str, library: Path, command: tuple[str, ...]) -> Path:
+def _load(source: Source, library: Path) -> dict[str, Function]:
+    return {role: ca.external(role, str(library)) for role in source.roles}
+
+
+def _make(name: str, c_code: str, library: Path, command: tuple[str, ...]) -> None:
     library.parent.mkdir(parents=True, exist_ok=True)
     with _locked(library.with_suffix(".lock")):
         _build_unless_intact(name, c_code, library, command)
-    return library
-
-
-def _loaded(source: Source, library: Future[Path]) -> dict[str, Function]:
-    try:
-        path = str(library.result())
-        return {role: ca.external(role, path) for role in source.roles}
-    except (OSError, subprocess.SubprocessError, RuntimeError) as error:
-        _report(source.name, error)
-        return source.write()
 
 
 def _report(name: str, error: Exception) -> None:

@@ -31,7 +31,6 @@ class _Bound:
     """A kernel with what each of its instances reads."""
 
     kernel: Kernel
-    terms: list[str]
     weights: NDArray[np.int64]
     selector: sparse.csr_array
     parameters: NDArray[np.int64]
@@ -40,7 +39,7 @@ class _Bound:
 
 
 @dataclass(frozen=True)
-class _Called:
+class _Mapped:
     """A kernel's functions and what all its instances give them: local variables, parameters and weights, by column."""
 
     bound: _Bound
@@ -49,7 +48,7 @@ class _Called:
     parameters: MX
     weights: MX
 
-    def mapped(self, role: str, *more: MX) -> Any:
+    def call(self, role: str, *more: MX) -> Any:
         """A function of the kernel for all instances."""
         function: Function = getattr(self.functions, role)
         return function.map(self.bound.count)(self.variables, self.parameters, self.weights, *more)
@@ -127,7 +126,7 @@ class Problem:
             if f"weight.{term}" not in self.parameters:
                 self.parameters.add(f"weight.{term}", (1,))
         weights = np.array([self.parameters[f"weight.{term}"][0] for term in terms], int)
-        self._bound.append(_Bound(kernel, terms, weights, selector, positions, count, first))
+        self._bound.append(_Bound(kernel, weights, selector, positions, count, first))
 
     def _constrain(self, kernel: Kernel, count: int, bounds: Mapping[str, tuple[ArrayLike, ArrayLike]]) -> None:
         """Reserve the kernel's constraint rows, instance after instance, and set their bounds."""
@@ -148,32 +147,34 @@ class Problem:
     @property
     def terms(self) -> list[str]:
         """Names of all cost terms."""
-        return list(dict.fromkeys(term for bound in self._bound for term in bound.terms))
+        return list(dict.fromkeys(term for bound in self._bound for term in bound.kernel.terms))
 
     def functions(self) -> dict[str, Function]:
         """Functions ``nlp`` (x, p) -> (f, g), ``grad_f``, ``jac_g``, ``hess_lag`` for nlpsol, and ``terms``."""
         x, p = MX.sym("x", self.variables.size), MX.sym("p", self.parameters.size)
         scale, multipliers = MX.sym("lam_f"), MX.sym("lam_g", self.constraints.size)
         kernels = kernel_functions([bound.kernel for bound in self._bound])
-        called = [_Called(b, k, *self._inputs(b, x, p)) for b, k in zip(self._bound, kernels, strict=True)]
-        values = [each.mapped("value") for each in called]
-        gradients = [each.mapped("gradient") for each in called]
+        mapped = [_Mapped(b, k, *self._inputs(b, x, p)) for b, k in zip(self._bound, kernels, strict=True)]
+        values = [each.call("value") for each in mapped]
+        gradients = [each.call("gradient") for each in mapped]
         f = sum((ca.sum2(total) for total, _, _ in values), MX(0))
-        g = ca.vertcat(*[ca.vec(g) for _, _, g in values if g.numel()]) if self.constraints.size else MX.zeros(0, 1)
+        g = self._stacked([each for _, _, each in values])
         gradient = MX.zeros(x.numel(), 1)
-        if called:
+        if gradients:
             spread = sparse.csr_array(sparse.vstack([bound.selector for bound in self._bound]).T)
             gradient = combined(spread, ca.vertcat(*[ca.vec(slope) for _, slope in gradients]))
+        # Each function's own: what it took from another would be computed twice.
         same_f = sum((ca.sum2(total) for total, _ in gradients), MX(0))
+        same_g, jacobian = self._jacobian(mapped)
         terms = self._term_values([v[1] for v in values], p)
         return {
             "nlp": Function("nlp", [x, p], [f, g], ["x", "p"], ["f", "g"]),
             "grad_f": Function("nlp_grad_f", [x, p], [same_f, gradient], ["x", "p"], ["f", "grad_f_x"]),
-            "jac_g": Function("nlp_jac_g", [x, p], [g, self._jacobian(called)], ["x", "p"], ["g", "jac_g_x"]),
+            "jac_g": Function("nlp_jac_g", [x, p], [same_g, jacobian], ["x", "p"], ["g", "jac_g_x"]),
             "hess_lag": Function(
                 "nlp_hess_l",
                 [x, p, scale, multipliers],
-                [self._hessian(called, scale, multipliers)],
+                [self._hessian(mapped, scale, multipliers)],
                 ["x", "p", "lam_f", "lam_g"],
                 ["triu_hess_gamma_x_x"],
             ),
@@ -184,7 +185,9 @@ class Problem:
         local = ca.reshape(combined(bound.selector, x), -1, bound.count)
         positions = bound.parameters.reshape(-1).tolist()
         parameters = ca.reshape(p[positions], -1, bound.count) if positions else MX.zeros(0, bound.count)
-        weights = ca.repmat(p[bound.weights.tolist()], 1, bound.count) if bound.terms else MX.zeros(0, bound.count)
+        weights = (
+            ca.repmat(p[bound.weights.tolist()], 1, bound.count) if bound.kernel.terms else MX.zeros(0, bound.count)
+        )
         return local, parameters, weights
 
     def _term_values(self, values: list[MX], p: MX) -> MX:
@@ -192,22 +195,30 @@ class Problem:
         totals = dict.fromkeys(self.terms, MX(0))
         for bound, terms in zip(self._bound, values, strict=True):
             sums = ca.sum2(terms)
-            for i, name in enumerate(bound.terms):
+            for i, name in enumerate(bound.kernel.terms):
                 totals[name] = totals[name] + p[int(bound.weights[i])] * sums[i]
         return ca.vertcat(*totals.values())
 
-    def _jacobian(self, called: list[_Called]) -> MX:
-        parts, sources = [], []
-        for each in called:
+    def _stacked(self, constraints: list[MX]) -> MX:
+        """Constraints (rows of a kernel, instances) of all kernels in one column."""
+        return ca.vertcat(*[ca.vec(g) for g in constraints if g.numel()]) if self.constraints.size else MX.zeros(0, 1)
+
+    def _jacobian(self, mapped: list[_Mapped]) -> tuple[MX, MX]:
+        """The constraints and their Jacobian."""
+        constraints, parts, sources = [], [], []
+        for each in mapped:
             bound, pattern = each.bound, each.functions.jacobian_pattern
+            g, nonzeros = each.call("jacobian")
+            constraints.append(g)
             if pattern.nnz():
                 parts.append(scatter_jacobian(bound.selector, bound.count, pattern, bound.first_row))
-                sources.append(ca.vec(each.mapped("jacobian")[1]))
-        return gather_nonzeros((self.constraints.size, self.variables.size), parts, sources)
+                sources.append(ca.vec(nonzeros))
+        shape = self.constraints.size, self.variables.size
+        return self._stacked(constraints), gather_nonzeros(shape, parts, sources)
 
-    def _hessian(self, called: list[_Called], scale: MX, multipliers: MX) -> MX:
+    def _hessian(self, mapped: list[_Mapped], scale: MX, multipliers: MX) -> MX:
         parts, sources = [], []
-        for each in called:
+        for each in mapped:
             bound, pattern = each.bound, each.functions.hessian_pattern
             if pattern.nnz():
                 width = each.functions.jacobian_pattern.size1()
@@ -215,7 +226,7 @@ class Problem:
                 local = ca.reshape(local, width, bound.count) if width else MX.zeros(0, bound.count)
                 scales = ca.repmat(scale, 1, bound.count)
                 parts.append(scatter_hessian(bound.selector, bound.count, pattern))
-                sources.append(ca.vec(each.mapped("hessian", scales, local)))
+                sources.append(ca.vec(each.call("hessian", scales, local)))
         return gather_nonzeros((self.variables.size, self.variables.size), parts, sources)
 
 

@@ -120,7 +120,7 @@ def _miss(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return by how much (K, 3) the shots miss the next orientation, and its Jacobian (K, 3, 3) in the launch rate."""
     step = 1e-4
-    # All seven shots of an interval at once: many small arrays take longer than a large one.
+    # The seven shots of all intervals at once: many small arrays take longer than a large one.
     rates = rate + step * np.vstack([np.zeros((1, 3)), np.eye(3), -np.eye(3)])[:, None]
     arrived = _integrate(folder, loads, start, rates)[3]
     miss = (end.inv() * arrived).as_rotvec()

@@ -147,6 +147,19 @@ def test_bounds_of_constraints_follow_their_rows(example: Example) -> None:
     assert (example.problem.constraint_lower == -np.inf).all()
 
 
+def test_a_single_number_is_a_column_too() -> None:
+    problem, kernel = Problem(), Kernel("one")
+    both = problem.variable("both", (2, 1))
+    y = kernel.variable("y", 1)
+    kernel.cost("distance", y - 1)
+    kernel.constrain("above", y)
+    problem.bind(kernel, [both.combine([[1, 1]])], bounds={"above": (0, np.inf)})
+    functions, x = problem.functions(), [0.5, 2.0]
+    np.testing.assert_allclose(np.asarray(functions["grad_f"](x, 1.0)[1]).reshape(-1), [3, 3])
+    np.testing.assert_allclose(np.asarray(functions["jac_g"](x, 1.0)[1]), [[1, 1]])
+    np.testing.assert_allclose(np.asarray(functions["hess_lag"](x, 1.0, 1.0, 0.0)), [[2, 2], [0, 2]])
+
+
 def test_a_kernel_bound_to_wrong_rows_is_refused() -> None:
     problem = Problem()
     narrow = problem.variable("narrow", (4, 1))

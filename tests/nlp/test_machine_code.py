@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from casadi import SX, Function
 
-from casadi_hands.nlp import Kernel, machine_code
+from casadi_hands.nlp import Kernel, assembly, machine_code
 from casadi_hands.nlp.assembly import kernel_functions
 from casadi_hands.nlp.machine_code import cache_folder, compiler
 from casadi_hands.stages import exact_fingers
@@ -93,6 +93,10 @@ def numbers(functions: dict[str, Function], x: Array) -> Array:
     return np.asarray(functions["first"](x)).ravel()
 
 
+def refuse(*_: object) -> dict[str, Function]:
+    raise AssertionError("written again")
+
+
 def is_compiled(functions: dict[str, Function]) -> bool:
     return not any(function.is_a("SXFunction") for function in functions.values())
 
@@ -116,9 +120,12 @@ def test_machine_code_gives_the_very_numbers_of_the_interpreter(
 ) -> None:
     monkeypatch.setattr("casadi_hands.nlp.assembly._known", {})
     (fast,) = kernel_functions([kernel])
-    assert kernel_functions([kernel, kernel]) == [fast, fast]
+    assert all(each is fast for each in kernel_functions([kernel, kernel]))
     monkeypatch.setattr("casadi_hands.nlp.assembly._known", {})
-    (kept,) = kernel_functions([kernel])  # now without differentiating anything
+    assembly._symbols.cache_clear()
+    with monkeypatch.context() as patch:
+        patch.setattr(assembly._Symbols, "differentiated", refuse)
+        (kept,) = kernel_functions([kernel])
     monkeypatch.setattr("casadi_hands.nlp.machine_code.compiler", lambda: None)
     monkeypatch.setattr("casadi_hands.nlp.assembly._known", {})
     (slow,) = kernel_functions([kernel])
@@ -154,18 +161,62 @@ def test_a_kernel_is_compiled_once(counting: Compiler) -> None:
 def test_kernels_in_the_cache_are_not_written_again() -> None:
     compiled("wave", wave())
     content = "".join(function.serialize() for function in wave().values())
-
-    def write() -> dict[str, Function]:
-        raise AssertionError("written again")
-
-    (again,) = machine_code.compiled([machine_code.Source("wave", content, ("first", "second"), write)])
+    (again,) = machine_code.compiled([machine_code.Source("wave", content, ("first", "second"), refuse)])
     x = np.array([0.3, -0.2, 0.9])
     np.testing.assert_allclose(numbers(again, x), np.sin(x) * np.linalg.norm(x))
 
 
-def test_kernels_are_compiled_at_once(counting: Compiler, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("fails", ["compiler", "cache"])
+def test_what_cannot_be_compiled_is_written_once(fails: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    if fails == "compiler":
+        monkeypatch.setenv("CC", str(shutil.which("false")))
+    else:
+        monkeypatch.setenv("CASADI_HANDS_CACHE", "/proc/cache")
+    written: list[dict[str, Function]] = []
+
+    def write() -> dict[str, Function]:
+        written.append(wave())
+        return written[-1]
+
+    assert machine_code.compiled([machine_code.Source("wave", "wave", ("first", "second"), write)]) == written
+    assert len(written) == 1
+
+
+def test_a_kernel_that_cannot_be_differentiated_is_no_matter_of_the_compiler() -> None:
+    def write() -> dict[str, Function]:
+        raise RuntimeError("wrong expression")
+
+    with pytest.raises(RuntimeError, match="wrong expression"):
+        machine_code.compiled([machine_code.Source("wave", "wave", ("first", "second"), write)])
+
+
+def test_an_interrupt_starts_no_further_compilers(counting: Compiler, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(machine_code, "_processors", lambda: 1)
+    functions = [wave(float(shift)) for shift in range(4)]
+    sources = [machine_code.Source("wave", f["first"].serialize(), list(f), lambda f=f: f) for f in functions]
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(machine_code, "_load", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        machine_code.compiled(sources)
+    time.sleep(1.5)  # in which the others would have been compiled
+    # The first, and what its thread had begun before the interrupt.
+    assert 1 <= counting.count <= 2
+
+
+def test_kernels_differentiated_otherwise_have_another_revision() -> None:
+    how = inspect.getsource(assembly._Symbols.differentiated) + inspect.getsource(assembly._nonzeros)
+    digest = hashlib.sha256(how.encode()).hexdigest()[:16]
+    assert (assembly._REVISION, digest) == ("1", "28c47e2ee9eecb29"), (
+        "count assembly._REVISION up: libraries are kept by it"
+    )
+
+
+def test_kernels_are_compiled_side_by_side(counting: Compiler, monkeypatch: pytest.MonkeyPatch) -> None:
     # Each compiler waits for the other to have begun.
-    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(machine_code, "_processors", lambda: 2)
     begun = counting.path.parent / "begun"
     lines = counting.path.read_text().splitlines()
     wait = f"echo . >> {begun}; for i in $(seq 300); do [ $(wc -l < {begun}) = 2 ] && break; sleep 0.1; done"

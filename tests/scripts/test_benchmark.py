@@ -76,13 +76,31 @@ def test_functions_and_loops_of_kernels_compute_the_same() -> None:
         stage.solve(dict(task.weights.floating))
     solver, x, p = stage.solver, posed[0].start, posed[0].parameters
     kernels = kernel_functions([bound.kernel for bound in solver.problem._bound])
-    multipliers = np.zeros(solver.problem.constraints.size)
-    loops = _loops(solver.problem, kernels, "value", x, p, multipliers)
-    total = 0.0
-    for loop, inputs in loops:
-        shaped = [ca.reshape(ca.DM(each), *loop.size_in(i)) for i, each in enumerate(inputs)]
-        total += float(ca.sum(loop.call(shaped)[0]))
-    assert total == pytest.approx(float(solver.functions["nlp"](x, p)[0]), rel=1e-12)
+    multipliers = np.random.default_rng(1).normal(size=solver.problem.constraints.size)
+
+    def called(role: str, output: int) -> list[np.ndarray]:
+        """What each kernel's loop gives, in a column."""
+        columns = []
+        for loop, inputs in _loops(solver.problem, kernels, role, x, p, multipliers):
+            shaped = [ca.reshape(ca.DM(each), *loop.size_in(i)) for i, each in enumerate(inputs)]
+            columns.append(np.asarray(ca.vec(loop.call(shaped)[output])).reshape(-1))
+        return columns
+
+    f, g = solver.functions["nlp"](x, p)
+    assert sum(column.sum() for column in called("value", 0)) == pytest.approx(float(f), rel=1e-12)
+    assert sum(column.sum() for column in called("gradient", 0)) == pytest.approx(float(f), rel=1e-12)
+    np.testing.assert_allclose(np.concatenate(called("jacobian", 0)), np.asarray(g).reshape(-1), rtol=1e-12)
+    # The Lagrangian's curvature along x, kernel by kernel: with multipliers in their places.
+    upper = np.asarray(solver.functions["hess_lag"](x, p, 1.0, multipliers))
+    curvature = x @ (upper + np.triu(upper, 1).T) @ x
+    along = 0.0
+    bounds = [(b, k) for b, k in zip(solver.problem._bound, kernels, strict=True) if k.hessian_pattern.nnz()]
+    for (bound, kernel), column in zip(bounds, called("hessian", 0), strict=True):
+        rows, columns = (np.array(each) for each in kernel.hessian_pattern.get_triplet())
+        local = (bound.selector @ x).reshape(bound.count, -1)
+        twice = np.where(rows == columns, 1.0, 2.0)
+        along += np.sum(column.reshape(bound.count, -1) * twice * local[:, rows] * local[:, columns])
+    assert along == pytest.approx(curvature, rel=1e-9)
     seconds = _compared(solver, x, p)
     assert list(seconds) == ["value", "gradient", "Jacobian", "Hessian"]
     assert all(whole > 0 and loop > 0 for whole, loop in seconds.values())
