@@ -182,7 +182,8 @@ def test_a_contact_out_of_reach_fails_the_task(
 
 
 def test_motors_too_weak_are_named_with_what_they_must_give(tmp_path: Path) -> None:
-    text = changed("actuator: {torque: 0.0005, speed: 5}")
+    # Of two trials the best hand may be one that needs three times the torque.
+    text = changed("actuator: {torque: 0.0005, speed: 5}").replace("trials: 2", "trials: 6")
     design = solve(parse_task(text), jobs=1, out=tmp_path)
     told = told_of(
         design,
