@@ -116,9 +116,9 @@ def test_two_palms_turn_the_capsule_on_the_table_alike() -> None:
     overhead, side = (planned(load_task(PROBLEMS / f"tabletop_rotation_{where}.yaml")) for where in ABOUT_THE_TABLE)
     for name in ("object_position", "object_orientation", "contact_force", "contact_point_object"):
         np.testing.assert_allclose(getattr(overhead, name), getattr(side, name), atol=1e-9)
-    # By far more than what is compared above, the object turns where it lies and forces change; contacts may stay.
-    for name in ("object_orientation", "contact_force"):
-        assert np.ptp(getattr(overhead, name), axis=0).max() > 1e-3
+    # By far more than what is compared above, the object turns where it lies, forces change and contacts creep (m).
+    for name, least in (("object_orientation", 1e-3), ("contact_force", 1e-3), ("contact_point_object", 1e-5)):
+        assert np.ptp(getattr(overhead, name), axis=0).max() > least
 
 
 def planned(task: Task) -> Motion:

@@ -43,7 +43,7 @@ class Options:
         # AMD ordering is a quarter to a third faster than MUMPS's own choice on these banded systems; little more than
         # the memory that it says it needs, instead of ten times that, saves another tenth; no search for a better
         # order of rows saves up to a third of small ones. Second-order corrections were seen to lead astray where
-        # friction's cones have their tips: solves took twice to ten times as long, or never converged.
+        # friction's cones have their tips: solves took two to seven times as long, or never converged.
         return {
             "print_level": 0,
             "sb": "yes",

@@ -87,6 +87,8 @@ def test_functions_and_loops_of_kernels_compute_the_same() -> None:
         return columns
 
     f, g = solver.functions["nlp"](x, p)
+    assert float(f) > 0
+    assert np.ptp(np.asarray(g)) > 0
     assert sum(column.sum() for column in called("value", 0)) == pytest.approx(float(f), rel=1e-12)
     assert sum(column.sum() for column in called("gradient", 0)) == pytest.approx(float(f), rel=1e-12)
     np.testing.assert_allclose(np.concatenate(called("jacobian", 0)), np.asarray(g).reshape(-1), rtol=1e-12)
@@ -100,6 +102,7 @@ def test_functions_and_loops_of_kernels_compute_the_same() -> None:
         local = (bound.selector @ x).reshape(bound.count, -1)
         twice = np.where(rows == columns, 1.0, 2.0)
         along += np.sum(column.reshape(bound.count, -1) * twice * local[:, rows] * local[:, columns])
+    assert abs(curvature) > 1
     assert along == pytest.approx(curvature, rel=1e-9)
     seconds = _compared(solver, x, p)
     assert list(seconds) == ["value", "gradient", "Jacobian", "Hessian"]
