@@ -3,13 +3,14 @@
 An exact motion on knots 0.2 s apart is near the one on dense knots, and costs half as much or less; what fails there
 would fail on dense knots too. Where contacts cannot go with the object, its whole motion is too far from anything a
 hand can do for a solver to find its way; a shorter one is not, and exact motions over more and more of the way lead
-from there to the goals.
+from there to the goals, on knots that are half as many again.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from casadi_hands.stages.refine_values import Margin
 from casadi_hands.stages.sampling import at_rest, extrapolated, resampled, resampled_model
 from casadi_hands.stages.whole_hand import WholeHand
 
-COARSE = 0.2  # s between coarse knots, at most
+SPARSE, COARSE = 0.4, 0.2  # s between knots, at most
 SERVES = 0.1  # cost of slip and of forces that no joint supplies, of a start that is nearly exact
 SHORTEST = 0.05  # of the way, by which a motion is lengthened at least
 LEAST = 0.1  # of the way, over which a first exact motion is looked for
@@ -50,12 +51,21 @@ class Continuation:
 
     @cached_property
     def coarse(self) -> RefineStage:
-        """The stage with fewer knots, or the fine one where there would be as many."""
-        model = resampled_model(self.model, self.model.schedule.stepped(COARSE))
-        samples = self.model.schedule.samples
-        if len(model.schedule.samples) == len(samples):
-            return self.fine
-        return RefineStage(model, self.contacts, self.joints, self.active[held(samples, model.schedule.samples)])
+        """The stage with fewer knots."""
+        return self._stepped(COARSE, self.fine)
+
+    @cached_property
+    def sparse(self) -> RefineStage:
+        """The stage with fewest knots."""
+        return self._stepped(SPARSE, self.coarse)
+
+    def _stepped(self, step: float, finer: RefineStage) -> RefineStage:
+        """The stage with knots at most ``step`` s apart, or a finer one where that has no more of them."""
+        model = resampled_model(self.model, self.model.schedule.stepped(step))
+        if len(model.schedule.samples) >= len(finer.model.schedule.samples):
+            return finer
+        active = self.active[held(self.model.schedule.samples, model.schedule.samples)]
+        return RefineStage(model, self.contacts, self.joints, active)
 
     def solve(self, start: WholeHand, margin: Margin | None = None, near: bool = False) -> Refined:
         """Refine a motion.
@@ -75,12 +85,8 @@ class Continuation:
                 ways.insert(0, LAST)
         runs: tuple[tuple[str, Solution], ...] = ()
         for way in ways:
-            if way == LAST or self.coarse is self.fine:
-                refined = self.fine.take(way, start, margin)
-            else:
-                begun = resampled(start, self.model, self.coarse.model)
-                refined = _named("coarse", self.coarse.take(way, begun, margin))
-                refined = self._on_fine(refined, start, margin)
+            taken = partial(self._taken, way, start, margin)
+            refined = taken(self.fine) if way == LAST else self._on_few(taken, start, margin)
             runs += refined.runs
             if refined.exact:
                 break
@@ -114,14 +120,32 @@ class Continuation:
             The motion over the whole way, or the longest exact one that was found.
         """
         margin = margin or Margin()
-        model = self.coarse.model
-        begun = resampled(start, self.model, model)
+        return self._on_few(partial(self._lengthened, start, share, margin), start, margin)
+
+    def _on_few(self, find: Callable[[RefineStage], Refined], start: WholeHand, margin: Margin) -> Refined:
+        """A motion found on sparse knots, or on coarse ones where that fails, made exact at the task's samples."""
+        stage, found = self.sparse, self._named(self.sparse, find(self.sparse))
+        if not found.exact and not found.slips_hopelessly and self.coarse is not self.sparse:
+            again = self._named(self.coarse, find(self.coarse))
+            if again.misses_less_than(found):
+                stage, found = self.coarse, replace(again, runs=found.runs + again.runs)
+            else:
+                found = replace(found, runs=found.runs + again.runs)
+        return self._finer(stage, found, start, margin)
+
+    def _taken(self, way: tuple[Step, ...], start: WholeHand, margin: Margin, stage: RefineStage) -> Refined:
+        """A motion solved on the knots of a stage."""
+        return stage.take(way, self._at(stage, start), margin)
+
+    def _lengthened(self, start: WholeHand, share: float, margin: Margin, stage: RefineStage) -> Refined:
+        """The longest motion found on the knots of a stage."""
+        model, begun = stage.model, self._at(stage, start)
         still = at_rest(model, begun)
-        refined = _named(f"{share:.0%} of the way,", self.coarse.take(LONG_WAY, begun, margin, share))
+        refined = _after(f"{share:.0%} of the way,", stage.take(LONG_WAY, begun, margin, share))
         runs = refined.runs
         while not refined.met and share / 2 >= LEAST:
             share, begun = share / 2, extrapolated(model, still, begun, -0.5)
-            refined = _named(f"{share:.0%} of the way,", self.coarse.take(LONG_WAY, begun, margin, share))
+            refined = _after(f"{share:.0%} of the way,", stage.take(LONG_WAY, begun, margin, share))
             runs += refined.runs
         longest, before, step = refined, at_rest(model, refined.hand), max((1 - share) / 3, SHORTEST)
         before_share = 0.0
@@ -130,35 +154,46 @@ class Continuation:
             share = 1.0 if share > 1 - SHORTEST / 2 else share
             by = (share - longest.share) / (longest.share - before_share)
             farther = extrapolated(model, before, longest.hand, by)
-            refined = _named(f"{share:.0%} of the way,", self.coarse.take(SHORT_WAY, farther, margin, share))
+            refined = _after(f"{share:.0%} of the way,", stage.take(SHORT_WAY, farther, margin, share))
             runs += refined.runs
             if refined.met:
                 before, before_share, longest = longest.hand, longest.share, refined
             else:
                 step /= 2
-        return self._on_fine(replace(longest, runs=runs), start, margin)
+        return replace(longest, runs=runs)
 
-    def _on_fine(self, refined: Refined, start: WholeHand, margin: Margin) -> Refined:
-        """A motion on coarse knots at the task's samples, made exact there if it is on the coarse ones."""
-        if self.coarse is self.fine:
+    def _finer(self, stage: RefineStage, refined: Refined, start: WholeHand, margin: Margin) -> Refined:
+        """A motion on a stage's knots at the task's samples, made exact on ever finer knots if it is on these."""
+        for finer in (self.coarse, self.fine):
+            if len(finer.model.schedule.samples) <= len(stage.model.schedule.samples):
+                continue
+            hand, begun = resampled(refined.hand, stage.model, finer.model), self._at(finer, start)
+            hand = replace(
+                hand, palm_position=begun.palm_position, palm_quaternion=begun.palm_quaternion, active=begun.active
+            )
+            stage, before, refined = finer, refined, replace(refined, hand=hand)
+            if not before.met:
+                continue
+            for way in (RENEWED, SHORT_WAY):
+                closer = self._named(finer, finer.take(way, hand, margin, before.share))
+                refined = replace(closer, runs=refined.runs + closer.runs)
+                if refined.met:
+                    break
+            if not refined.slips_hopelessly:
+                refined = replace(refined, slips=before.slips)
+        return refined
+
+    def _at(self, stage: RefineStage, hand: WholeHand) -> WholeHand:
+        """A motion with the task's samples on a stage's knots."""
+        return hand if stage is self.fine else resampled(hand, self.model, stage.model)
+
+    def _named(self, stage: RefineStage, refined: Refined) -> Refined:
+        """The same with its solves named after the stage's knots."""
+        if stage is self.fine:
             return refined
-        hand = replace(
-            resampled(refined.hand, self.coarse.model, self.model),
-            palm_position=start.palm_position,
-            palm_quaternion=start.palm_quaternion,
-            active=start.active,
-        )
-        if not refined.met:
-            return replace(refined, hand=hand)
-        runs = refined.runs
-        for way in (RENEWED, SHORT_WAY):
-            fine = self.fine.take(way, hand, margin, refined.share)
-            runs += fine.runs
-            if fine.met:
-                break
-        slips = fine.slips if fine.slips_hopelessly else refined.slips
-        return replace(fine, runs=runs, slips=slips)
+        return _after("coarse" if stage is self.coarse else "sparse", refined)
 
 
-def _named(prefix: str, refined: Refined) -> Refined:
-    return replace(refined, runs=tuple((f"{prefix} {what}", solution) for what, solution in refined.runs))
+def _after(words: str, refined: Refined) -> Refined:
+    """The same with words before the name of each solve."""
+    return replace(refined, runs=tuple((f"{words} {what}", solution) for what, solution in refined.runs))

@@ -265,7 +265,7 @@ def test_the_result_is_exact_and_the_audit_certifies_it(solved: Solved) -> None:
     assert solved.verdict.reasons == []
     assert solved.verdict.certified
     names = [what for what, _ in solved.refined.runs]
-    assert (names[0], names[-1]) == ("coarse soft", "exact")
+    assert (names[0], names[-1]) == ("sparse soft", "exact")
 
 
 def test_the_files_have_the_points_and_forces_that_balance(solved: Solved) -> None:
@@ -318,7 +318,7 @@ def test_what_moved_is_told(solved: Solved) -> None:
 def test_the_slip_left_by_the_firm_solve_is_told(solved: Solved) -> None:
     assert set(solved.refined.slips) == set(solved.task.fingers)
     assert 0 < max(solved.refined.slips.values()) < HOPELESS
-    *_, firm = (solution.constraints for what, solution in solved.refined.runs if what.startswith("coarse firm"))
+    *_, firm = (solution.constraints for what, solution in solved.refined.runs if what.startswith("sparse firm"))
     for contact, name in enumerate(solved.model.contact_names):
         steps = np.linalg.norm(firm[f"rolling{contact}.no_slip"], axis=1)
         assert solved.refined.slips[name] == pytest.approx(steps.sum(), rel=1e-12)
@@ -344,10 +344,10 @@ def test_one_joint_cannot_roll_with_the_object_and_no_exact_solve_is_tried(solve
     assert not refined.exact
     assert max(refined.slips.values()) > HOPELESS
     names = [what for what, _ in refined.runs]
-    assert names[0] == "coarse soft"
+    assert names[0] == "sparse soft"
     assert not any("exact" in name for name in names)
     assert len(refined.hand.position) == len(model.schedule.samples)
-    assert refined.weights == {f"coarse {what}": weights for what, weights, _ in LONG_WAY}[names[-1]]
+    assert refined.weights == {f"sparse {what}": weights for what, weights, _ in LONG_WAY}[names[-1]]
 
 
 def test_an_exact_motion_stays_itself_by_the_short_way(solved: Solved) -> None:
@@ -379,5 +379,5 @@ def test_where_the_short_way_leads_nowhere_the_long_one_is_taken(
     again = Continuation(farther, before.contacts, (2,) * model.contacts, before.active).solve(before, near=True)
     assert again.exact
     names = [what for what, _ in again.runs]
-    assert (names[0], names[-1]) == ("coarse firm", "exact")
-    assert "coarse soft" in names
+    assert (names[0], names[-1]) == ("sparse firm", "exact")
+    assert "sparse soft" in names
