@@ -34,6 +34,8 @@ BARRIERS = (
     replace(OPTIONS, extra=(("mu_strategy", "adaptive"), ("mu_max", 0.1))),
     replace(OPTIONS, mu_init=1e-2),
 )
+# Contacts that are held back: an adaptive barrier grew and shrank there until its cap in three of eight tasks.
+HELD_BACK = (replace(OPTIONS, mu_init=1e-3), *BARRIERS)
 BROKEN = 1e-3  # violation of friction's cones: forces of zero meet them, so what leaves more has broken down
 
 
@@ -158,10 +160,10 @@ class FloatingStage:
         moved = np.any(patches != patches[0], axis=(0, 2))
         room = np.where(moved, REGRASP_ROOM, np.inf)[None, :, None]
         lower, upper = ({**fixed, "point": (patches + side * room).reshape(keyframes, -1)} for side in (-1, 1))
-        solution = self._solved({**start, **fixed}, parameters, lower, upper)
+        what, barriers = ("regrasp", BARRIERS) if self.model.regrasp.lifted.any() else ("held back", HELD_BACK)
+        solution = self._solved({**start, **fixed}, parameters, lower, upper, barriers)
         if not passes_gate(self.model, solution.values, pivots=True):
             return None
-        what = "regrasp" if self.model.regrasp.lifted.any() else "held back"
         return self._like(before, flags, solution, (*before.runs, (what, solution)))
 
     def solve_as(self, other: Floating, weights: Mapping[str, float]) -> Floating:
@@ -177,10 +179,11 @@ class FloatingStage:
         parameters: Mapping[str, Array | float],
         lower: Mapping[str, Array] | None = None,
         upper: Mapping[str, Array] | None = None,
+        barriers: tuple[Options, ...] = BARRIERS,
     ) -> Solution:
         """The solution by the first barrier that does not break down, or the one that breaks down least."""
         solutions: list[Solution] = []
-        for options in BARRIERS:
+        for options in barriers:
             solutions.append(self.solver.solve(start, parameters, options, lower, upper))
             if solutions[-1].violation <= BROKEN:
                 break
