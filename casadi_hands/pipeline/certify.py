@@ -183,7 +183,7 @@ class Refiner:
         if drops > DROPS and margin != FIRM:
             text = f"again with a firmer grip: {drops} of {REPLAYS} replays dropped the object"
             with self.record.stage("refine", text):
-                firmer = self._attempt(whole, FIRM, partial(stage.renew, refined.hand, firmer=True))
+                firmer = self._attempt(whole, FIRM, partial(stage.tighten, refined.hand))
             design = self._judged(stage.model, firmer, short, planned)
             fewer = self._drops(design) if design.status == "certified" else drops
             if fewer < drops:

@@ -67,7 +67,7 @@ class Continuation:
         active = self.active[held(self.model.schedule.samples, model.schedule.samples)]
         return RefineStage(model, self.contacts, self.joints, active)
 
-    def solve(self, start: WholeHand, margin: Margin | None = None, near: bool = False) -> Refined:
+    def solve(self, start: WholeHand, margin: Margin, near: bool = False) -> Refined:
         """Refine a motion.
 
         Args:
@@ -76,7 +76,6 @@ class Continuation:
             near: whether the motion is nearly exact already, and the hand shall stay nearly what it is: then shorter
                 ways are tried first.
         """
-        margin = margin or Margin()
         ways: list[tuple[Step, ...]] = [LONG_WAY]
         if near:
             ways.insert(0, SHORT_WAY)
@@ -92,23 +91,31 @@ class Continuation:
                 break
         return replace(refined, runs=runs)
 
-    def renew(self, start: WholeHand, margin: Margin | None = None, firmer: bool = False) -> Refined:
-        """Refine a motion that is exact already, but for other samples or another margin.
+    def renew(self, start: WholeHand, margin: Margin) -> Refined:
+        """Refine a motion that was exact at other samples.
 
         Args:
             start: the motion, at the task's samples.
             margin: to keep to the limits.
-            firmer: whether the margin is larger than the motion's.
         """
         runs: tuple[tuple[str, Solution], ...] = ()
-        for way in (LAST,) if firmer else (RENEWED, LAST):
-            refined = self.fine.take(way, start, margin or Margin())
+        for way in (RENEWED, LAST):
+            refined = self.fine.take(way, start, margin)
             runs += refined.runs
             if refined.met:
                 break
         return replace(refined, runs=runs)
 
-    def lengthen(self, start: WholeHand, share: float, margin: Margin | None = None) -> Refined:
+    def tighten(self, start: WholeHand, margin: Margin) -> Refined:
+        """Refine a motion that is exact with a smaller margin.
+
+        Args:
+            start: the motion.
+            margin: to keep to the limits.
+        """
+        return self._on_few(partial(self._taken, SHORT_WAY, start, margin), start, margin)
+
+    def lengthen(self, start: WholeHand, share: float, margin: Margin) -> Refined:
         """Refine a motion over a share of the way to its goals, and lengthen it until it reaches them.
 
         Args:
@@ -119,7 +126,6 @@ class Continuation:
         Returns:
             The motion over the whole way, or the longest exact one that was found.
         """
-        margin = margin or Margin()
         return self._on_few(partial(self._lengthened, start, share, margin), start, margin)
 
     def _on_few(self, find: Callable[[RefineStage], Refined], start: WholeHand, margin: Margin) -> Refined:
@@ -127,7 +133,7 @@ class Continuation:
         stage, found = self.sparse, self._named(self.sparse, find(self.sparse))
         if not found.exact and not found.slips_hopelessly and self.coarse is not self.sparse:
             again = self._named(self.coarse, find(self.coarse))
-            if again.misses_less_than(found):
+            if again.exact or again.misses_less_than(found):
                 stage, found = self.coarse, replace(again, runs=found.runs + again.runs)
             else:
                 found = replace(found, runs=found.runs + again.runs)

@@ -247,7 +247,7 @@ def solved(tmp_path_factory: pytest.TempPathFactory) -> Solved:
     model = build_model(task)
     floating = FloatingStage(model).solve(dict(task.weights.floating))
     whole = whole_hand_of_two_joints(task, model, floating, trials=3)
-    refined = Continuation(model, whole.contacts, (2,) * model.contacts, whole.active).solve(whole)
+    refined = Continuation(model, whole.contacts, (2,) * model.contacts, whole.active).solve(whole, Margin())
     result = refined.hand
     torque, speed = joint_loads(model, result)
     built = hand_of(task, model, result.fingers, result.contacts, torque, speed)
@@ -338,7 +338,7 @@ def test_one_joint_cannot_roll_with_the_object_and_no_exact_solve_is_tried(solve
         for finger in whole.fingers
     )
     start = replace(whole, fingers=fingers, angles=tuple(angles[:, :1] for angles in whole.angles))
-    refined = Continuation(model, whole.contacts, (1, 1, 1), whole.active).solve(start)
+    refined = Continuation(model, whole.contacts, (1, 1, 1), whole.active).solve(start, Margin())
     assert refined.slips_hopelessly
     assert refined.barely_rolls
     assert not refined.exact
@@ -353,7 +353,7 @@ def test_one_joint_cannot_roll_with_the_object_and_no_exact_solve_is_tried(solve
 def test_an_exact_motion_stays_itself_by_the_short_way(solved: Solved) -> None:
     model, before = solved.model, solved.refined.hand
     ways = Continuation(model, before.contacts, (2,) * model.contacts, before.active)
-    again = ways.solve(before, near=True)
+    again = ways.solve(before, Margin(), near=True)
     assert again.exact
     names = [what for what, _ in again.runs]
     assert (names[0], names[-1]) == ("exact", "exact")
@@ -376,7 +376,9 @@ def test_where_the_short_way_leads_nowhere_the_long_one_is_taken(
     farther = replace(
         model, goal_positions=np.add(model.goal_positions, [[0, 0, 0], [0, 0.05, 0], [0, 0, 0], [0, 0, 0]])
     )
-    again = Continuation(farther, before.contacts, (2,) * model.contacts, before.active).solve(before, near=True)
+    again = Continuation(farther, before.contacts, (2,) * model.contacts, before.active).solve(
+        before, Margin(), near=True
+    )
     assert again.exact
     names = [what for what, _ in again.runs]
     assert (names[0], names[-1]) == ("sparse firm", "exact")
