@@ -29,7 +29,7 @@ SOFT = Options(150, tol=1e-3, acceptable_tol=1e-2, mu_init=1e-3, most_multiplier
 FIRM_SOLVE = replace(SOFT, constr_viol_tol=1e-6, mu_init=1e-4)
 HARD = replace(FIRM_SOLVE, max_iter=300, tol=1e-4, acceptable_tol=1e-3, constr_viol_tol=1e-10)
 # From an exact motion of the same margins: a larger barrier would first push it off every bound that it rests on.
-NEARBY = replace(HARD, mu_init=1e-5)
+NEARBY = replace(HARD, max_iter=150, mu_init=1e-5)
 ACCEPTED = 1e-7  # largest violation with which a refined motion is handed on
 HOPELESS = 0.1  # half extents of slip: where firm solves leave more, rolling is out of the structure's reach
 FALLING = 0.5  # of the soft solve's slip: where the firm one leaves more than hopeless, but less than this, it goes on
