@@ -162,7 +162,7 @@ class Refiner:
         """
         planned = self.record.design
         stage = Continuation(self.model, whole.contacts, tuple(f.joints for f in whole.fingers), whole.active)
-        refined, margin = self._refined(stage, whole, margin, near, share)
+        refined = self._refined(stage, whole, margin, near, share)
         judged = self._judged(stage.model, refined, short, planned)
         while refined.exact and judged.missed & BETWEEN:
             schedule = stage.model.schedule
@@ -174,13 +174,13 @@ class Refiner:
             text = f"again with samples in the middle of {crowded.sum()} of {len(crowded)} intervals: {judged.reason}"
             with self.record.stage("refine", text):
                 halved = Continuation(finer, stage.contacts, stage.joints, hand.active)
-                closer = self._attempt(whole, margin, partial(halved.renew, hand))
+                closer = self._attempt(whole, refined.margin, partial(halved.renew, hand))
             design = self._judged(finer, closer, short, planned)
             if _excess(design) > GAIN * _excess(judged) and len(design.missed) >= len(judged.missed):
                 break
             judged, refined, stage = design, closer, halved
         drops = self._drops(judged)
-        if drops > DROPS and margin != FIRM:
+        if drops > DROPS and refined.margin != FIRM:
             text = f"again with a firmer grip: {drops} of {REPLAYS} replays dropped the object"
             with self.record.stage("refine", text):
                 firmer = self._attempt(whole, FIRM, partial(stage.tighten, refined.hand))
@@ -190,18 +190,23 @@ class Refiner:
                 return design, firmer, fewer
         return judged, refined, drops
 
-    def _refined(
-        self, stage: Continuation, whole: WholeHand, margin: Margin, near: bool, share: float
-    ) -> tuple[Refined, Margin]:
-        """The refinement with this margin or, where that is not exact and another may be, with a small one."""
-        again = partial(stage.solve if share == 1 else partial(stage.lengthen, share=share), whole)
+    def _refined(self, stage: Continuation, whole: WholeHand, margin: Margin, near: bool, share: float) -> Refined:
+        """The refinement with this margin or, where that is not exact and another may be, with a small one.
+
+        Over a long way errors add up, and a firm grip is needed nearly always: it is kept at once where it can be.
+        """
+        again: Callable[..., Refined] = partial(stage.solve, whole)
+        first = partial(again, near=near)
+        if share < 1:
+            again = partial(stage.lengthen, whole, share)
+            first = partial(again, firmer=FIRM)
         with self.record.stage("refine", "the same motion with exact physics, rolling contacts and clearance"):
-            refined = self._attempt(whole, margin, partial(again, near=True) if near else again)
+            refined = self._attempt(whole, margin, first)
         if refined.exact or refined.barely_rolls or margin == SMALL:
-            return refined, margin
+            return refined
         with self.record.stage("refine", "again, closer to the limits of friction and grip"):
             second = self._attempt(whole, SMALL, again)
-        return (second, SMALL) if second.exact or second.misses_less_than(refined) else (refined, margin)
+        return second if second.exact or second.misses_less_than(refined) else refined
 
     def _attempt(self, whole: WholeHand, margin: Margin, way: Callable[..., Refined]) -> Refined:
         """Refine with one margin, and record all solves, whether they serve or not."""

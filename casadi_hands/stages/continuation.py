@@ -115,29 +115,41 @@ class Continuation:
         """
         return self._on_few(partial(self._taken, SHORT_WAY, start, margin), start, margin)
 
-    def lengthen(self, start: WholeHand, share: float, margin: Margin) -> Refined:
+    def lengthen(self, start: WholeHand, share: float, margin: Margin, firmer: Margin | None = None) -> Refined:
         """Refine a motion over a share of the way to its goals, and lengthen it until it reaches them.
 
         Args:
             start: the motion over this share of the way.
             share: of the way.
             margin: to keep to the limits.
+            firmer: a larger one, kept where an exact motion with it is found near the one without.
 
         Returns:
             The motion over the whole way, or the longest exact one that was found.
         """
-        return self._on_few(partial(self._lengthened, start, share, margin), start, margin)
+        stage, longest = self._found(partial(self._lengthened, start, share, margin))
+        if firmer is not None and longest.exact:
+            tight = _after("firmer grip,", stage.take(SHORT_WAY, longest.hand, firmer))
+            tight = self._finer(stage, self._named(stage, tight), start, firmer)
+            if tight.exact:
+                return replace(tight, runs=longest.runs + tight.runs)
+            longest = replace(longest, runs=longest.runs + tight.runs)
+        return self._finer(stage, longest, start, margin)
 
     def _on_few(self, find: Callable[[RefineStage], Refined], start: WholeHand, margin: Margin) -> Refined:
-        """A motion found on sparse knots, or on coarse ones where that fails, made exact at the task's samples."""
+        """A motion found on few knots, made exact at the task's samples."""
+        return self._finer(*self._found(find), start, margin)
+
+    def _found(self, find: Callable[[RefineStage], Refined]) -> tuple[RefineStage, Refined]:
+        """A motion found on sparse knots, or on coarse ones where that fails, with the stage it was found by."""
         stage, found = self.sparse, self._named(self.sparse, find(self.sparse))
         if not found.exact and not found.slips_hopelessly and self.coarse is not self.sparse:
             again = self._named(self.coarse, find(self.coarse))
+            runs = found.runs + again.runs
             if again.exact or again.misses_less_than(found):
-                stage, found = self.coarse, replace(again, runs=found.runs + again.runs)
-            else:
-                found = replace(found, runs=found.runs + again.runs)
-        return self._finer(stage, found, start, margin)
+                stage, found = self.coarse, again
+            found = replace(found, runs=runs)
+        return stage, found
 
     def _taken(self, way: tuple[Step, ...], start: WholeHand, margin: Margin, stage: RefineStage) -> Refined:
         """A motion solved on the knots of a stage."""

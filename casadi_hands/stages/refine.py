@@ -93,6 +93,7 @@ class Refined:
         slips_hopelessly: whether the firm solves were left with so much slip that no exact one was tried.
         runs: every solve: (what, solution).
         weights: of the terms of the motion's solve.
+        margin: to keep to the limits, that it was solved with.
         share: of the way to its goals that the motion goes.
     """
 
@@ -103,6 +104,7 @@ class Refined:
     slips_hopelessly: bool
     runs: tuple[tuple[str, Solution], ...]
     weights: dict[str, float]
+    margin: Margin
     share: float = 1.0
 
     @property
@@ -161,7 +163,7 @@ class RefineStage:
             values, used = solution.values, weights
             if what != "exact":
                 slips = self._slips(solution)
-        return replace(self._result(start, runs, slips or self._slips(solution), used), share=share)
+        return replace(self._result(start, runs, slips or self._slips(solution), used, margin), share=share)
 
     def costs(self, step: Step, start: WholeHand, margin: Margin) -> dict[str, float]:
         """The weighted terms of a motion, as a step weights them."""
@@ -177,7 +179,12 @@ class RefineStage:
         return {who: float(np.linalg.norm(solution.constraints[name], axis=1).sum()) for who, name in names.items()}
 
     def _result(
-        self, start: WholeHand, runs: list[tuple[str, Solution]], slips: dict[str, float], weights: dict[str, float]
+        self,
+        start: WholeHand,
+        runs: list[tuple[str, Solution]],
+        slips: dict[str, float],
+        weights: dict[str, float],
+        margin: Margin,
     ) -> Refined:
         solution = runs[-1][1]
         values, count = solution.values, len(self.model.schedule.samples)
@@ -210,7 +217,7 @@ class RefineStage:
         worst = self._worst(solution)
         hopeless = runs[-1][0] != "exact"
         met = not hopeless and worst.violation <= ACCEPTED
-        return Refined(hand, met, worst, slips, hopeless, tuple(runs), weights)
+        return Refined(hand, met, worst, slips, hopeless, tuple(runs), weights, margin)
 
     def _worst(self, solution: Solution) -> Worst:
         name, violation = max(solution.violations.items(), key=lambda item: item[1])

@@ -13,7 +13,7 @@ import pytest
 from casadi_hands.design import Design
 from casadi_hands.errors import HandsError
 from casadi_hands.pipeline import certify
-from casadi_hands.pipeline.certify import FIRM, REPLAYS, Certifier, Refiner, intervals_to_halve
+from casadi_hands.pipeline.certify import AMPLE, FIRM, REPLAYS, Certifier, Refiner, intervals_to_halve
 from casadi_hands.pipeline.record import Record
 from casadi_hands.search.algorithm import Candidate, Found
 from casadi_hands.stages.model import build_model
@@ -206,11 +206,12 @@ def test_what_is_missed_only_between_samples_gets_more_of_them(
         def __init__(self, model: Any, *_: Any) -> None:
             self.model = model
 
-        def solve(self, start: Any, margin: Margin) -> Any:
+        def renew(self, start: Any, margin: Margin) -> Any:
             tried.append(self.model.schedule.samples)
-            return SimpleNamespace(exact=True, barely_rolls=False, hand=start, runs=(), weights={})
+            return SimpleNamespace(exact=True, barely_rolls=False, hand=start, runs=(), weights={}, margin=margin)
 
-        renew = solve
+        def solve(self, start: Any, margin: Margin, near: bool) -> Any:
+            return self.renew(start, margin)
 
     def judged(self: Refiner, model: Any, *_: Any) -> Design:
         fine = np.diff(model.schedule.samples)[0] < 0.03
@@ -235,6 +236,39 @@ def test_what_is_missed_only_between_samples_gets_more_of_them(
     assert [len(samples) - len(tried[0]) for samples in tried] == [0, 2, 4][: 1 + again]
     assert design.status == ("certified" if again else "feasible")
     assert drops == 0
+
+
+@pytest.mark.parametrize(("share", "got", "renewed"), [(1.0, AMPLE, True), (0.5, AMPLE, True), (0.5, FIRM, False)])
+def test_a_long_way_is_gone_with_a_firm_grip_at_once_where_it_can_be(
+    monkeypatch: pytest.MonkeyPatch, share: float, got: Margin, renewed: bool
+) -> None:
+    asked: list[tuple[str, Any]] = []
+
+    def taken(name: str, margin: Margin) -> Any:
+        asked.append((name, margin))
+        return SimpleNamespace(exact=True, barely_rolls=False, hand=None, runs=(), weights={}, margin=margin)
+
+    def lengthen(start: Any, part: float, margin: Margin, firmer: Margin) -> Any:
+        assert (part, margin, firmer) == (0.5, AMPLE, FIRM)
+        return taken("lengthen", got)
+
+    stage = SimpleNamespace(
+        model=None,
+        lengthen=lengthen,
+        solve=lambda start, margin, near: taken("solve", margin),
+        tighten=lambda start, margin: taken("tighten", margin),
+    )
+    monkeypatch.setattr(certify, "Continuation", lambda *_: stage)
+    monkeypatch.setattr(Refiner, "_attempt", lambda self, whole, margin, way: way(margin=margin))
+    monkeypatch.setattr(Refiner, "_judged", lambda self, *_: replace(self.record.design, status="certified"))
+    monkeypatch.setattr(Refiner, "_drops", lambda self, design: 4)
+    whole: Any = SimpleNamespace(contacts=(0, 1), fingers=(), active=None)
+    record = Record(ball_task(), None, lambda _: None)
+    unused: Any = None
+    *_, drops = Refiner(record, unused, unused, 1).certify(whole, (), share=share)
+    first = ("solve", AMPLE) if share == 1 else ("lengthen", got)
+    assert asked == [first, *[("tighten", FIRM)] * renewed]
+    assert drops == 4
 
 
 def test_intervals_that_use_up_a_limit_and_their_neighbours_are_halved() -> None:

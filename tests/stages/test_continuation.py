@@ -56,8 +56,8 @@ class Told(Continuation):
             moved = SimpleNamespace(**vars(hand))
             moved.position = hand.position[:1] + share * np.linspace(0, 1, len(hand.position))[:, None]
             result, slips = WholeHand(**vars(moved)), {level: share}
-            exact = self.exact_where(level, share)
-            return Refined(result, exact, Worst("a.b", 0.0, None), slips, self.hopeless and not exact, runs, {}, share)
+            exact, worst = self.exact_where(level, share), Worst("a.b", 0.0, None)
+            return Refined(result, exact, worst, slips, self.hopeless and not exact, runs, {}, margin, share)
 
         return SimpleNamespace(model=model, take=take, costs=lambda *_: {"slip": 1.0, "passive_force": 0.0})
 
@@ -177,6 +177,20 @@ def test_where_the_first_part_fails_a_shorter_one_is_looked_for(start: WholeHand
     first, second = (place for *_, place in told.taken[:2])
     assert second - start.position[0, 0] == pytest.approx((first - start.position[0, 0]) / 2)
     assert refined.exact
+
+
+@pytest.mark.parametrize("fails_on", ["", "sparse", "coarse", "fine"])
+def test_a_firmer_grip_is_kept_where_it_is_exact(start: WholeHand, fails_on: str) -> None:
+    firm, lengthened = Margin(normal_force=2.0), 4
+    told = Told(lambda level, share: level != fails_on or len(told.taken) <= lengthened)
+    refined = told.lengthen(start, 0.5, Margin(), firm)
+    denser = [("sparse", SHORT), ("coarse", "exact"), ("fine", "exact")]
+    if not fails_on:
+        assert told.ways[lengthened:] == denser
+    assert refined.exact == (fails_on in ("", "sparse"))
+    assert refined.margin == (Margin() if fails_on else firm)
+    assert len(refined.runs) == sum(len(way.split()) for _, way in told.ways)
+    assert "sparse firmer grip, firm" in [what for what, _ in refined.runs]
 
 
 def test_a_short_rest_of_the_way_is_gone_in_one_step(start: WholeHand) -> None:
