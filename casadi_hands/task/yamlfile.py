@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from functools import lru_cache
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -72,7 +73,7 @@ def read(path: FilePath) -> str:
 
 def _parse(text: str, source: str) -> Any:
     try:
-        tree = YAML(typ="rt").load(text)
+        tree = _tree(text)
     except DuplicateKeyError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
         name = str(error.problem).split('"')[1]
@@ -92,6 +93,12 @@ def _parse(text: str, source: str) -> Any:
         wanted = "a task file is a mapping of fields such as object, palm, motion and fingers"
         raise TaskError(f"{source}:1: given {given}; {wanted}")
     return tree
+
+
+@lru_cache(maxsize=4)
+def _tree(text: str) -> Any:
+    """The text with its lines; a solve reads the task that it wrote once for each audit."""
+    return YAML(typ="rt").load(text)
 
 
 def _plain(node: Any) -> Any:
