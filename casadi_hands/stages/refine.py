@@ -27,7 +27,8 @@ _MOST = 1e7  # of a multiplier; a regular one was seen to reach a tenth of that
 # large one first wanders to the middle of all bounds and back; too small ones crawl along every bound they meet.
 SOFT = Options(150, tol=1e-3, acceptable_tol=1e-2, mu_init=1e-3, most_multiplier=_MOST, extra=_NEAR)
 FIRM_SOLVE = replace(SOFT, constr_viol_tol=1e-6, mu_init=1e-4)
-HARD = replace(FIRM_SOLVE, max_iter=300, tol=1e-4, acceptable_tol=1e-3, constr_viol_tol=1e-10)
+_MET = ("acceptable_constr_viol_tol", 1e-8)  # by default a solve may end far from its constraints
+HARD = replace(FIRM_SOLVE, max_iter=300, tol=1e-4, acceptable_tol=1e-3, constr_viol_tol=1e-10, extra=(*_NEAR, _MET))
 # From an exact motion of the same margins: a larger barrier would first push it off every bound that it rests on.
 NEARBY = replace(HARD, max_iter=150, mu_init=1e-5)
 ACCEPTED = 1e-7  # largest violation with which a refined motion is handed on
