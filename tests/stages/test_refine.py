@@ -161,7 +161,7 @@ def test_a_result_has_every_contact_in_its_own_place(made_up: MadeUp) -> None:
     # The middle finger is not in use: its point stays, and it bears nothing.
     start, values = made_up.start, made_up.values
     solution = replace(made_up_solution(values), excess={"a": np.array([ACCEPTED]), "b": np.zeros(2)})
-    refined = made_up.stage._result(start, [("exact", solution)], {}, WEIGHTS)
+    refined = made_up.stage._result(start, [("exact", solution)], {}, WEIGHTS, Margin())
     hand, count = refined.hand, len(start.position)
     for column, contact in enumerate((0, 2, 3)):
         for name in ("point", "force"):
@@ -186,7 +186,7 @@ def test_a_result_has_every_contact_in_its_own_place(made_up: MadeUp) -> None:
 @pytest.mark.parametrize("violation", [1.01 * ACCEPTED, np.inf])
 def test_a_motion_that_violates_is_not_exact(made_up: MadeUp, violation: float) -> None:
     solution = replace(made_up_solution(made_up.values), excess={"a": np.zeros(1), "b": np.array([0.0, violation])})
-    refined = made_up.stage._result(made_up.start, [("exact", solution)], {}, WEIGHTS)
+    refined = made_up.stage._result(made_up.start, [("exact", solution)], {}, WEIGHTS, Margin())
     assert not refined.exact
     assert refined.worst == Worst("b", violation, None)
 
@@ -223,7 +223,7 @@ def test_a_start_that_is_no_number_is_never_accepted(drawn: MadeUp) -> None:
     solution = drawn.stage.solver.solve(values, drawn.parameters(WEIGHTS), HARD)
     assert solution.objective == np.inf
     assert solution.violations["wrench.sum"] == np.inf
-    assert not drawn.stage._result(bad, [("exact", solution)], {}, WEIGHTS).exact
+    assert not drawn.stage._result(bad, [("exact", solution)], {}, WEIGHTS, Margin()).exact
 
 
 # A solve: figure 3.6a with two joints a finger, from three random starts each.
