@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from casadi_hands.motion import held
 from casadi_hands.nlp import Solution
 from casadi_hands.stages.model import Model
-from casadi_hands.stages.refine import LAST, LONG_WAY, RENEWED, SHORT_WAY, Refined, RefineStage, Step
+from casadi_hands.stages.refine import FIRM_SOLVE, LAST, LONG_WAY, RENEWED, SHORT_WAY, Refined, RefineStage, Step
 from casadi_hands.stages.refine_values import Margin
 from casadi_hands.stages.sampling import at_rest, extrapolated, resampled, resampled_model
 from casadi_hands.stages.whole_hand import WholeHand
@@ -127,29 +127,45 @@ class Continuation:
         Returns:
             The motion over the whole way, or the longest exact one that was found.
         """
-        stage, longest = self._found(partial(self._lengthened, start, share, margin))
-        if firmer is not None and longest.exact:
-            tight = _after("firmer grip,", stage.take(SHORT_WAY, longest.hand, firmer))
-            tight = self._finer(stage, self._named(stage, tight), start, firmer)
+        return self._on_few(partial(self._lengthened, start, share, margin), start, margin, firmer)
+
+    def _on_few(
+        self,
+        find: Callable[[RefineStage], Refined],
+        start: WholeHand,
+        margin: Margin,
+        firmer: Margin | None = None,
+    ) -> Refined:
+        """A motion found on sparse knots, or on coarse ones where that fails, made exact at the task's samples.
+
+        Few knots may be too few for a quick motion, but where one on them obeys physics and still slips far, one on
+        more knots does, too.
+        """
+        best: Refined | None = None
+        for stage in (self.sparse,) if self.coarse is self.sparse else (self.sparse, self.coarse):
+            found = self._named(stage, find(stage))
+            refined = self._made_exact(stage, found, start, margin, firmer)
+            if best is not None:
+                runs = best.runs + refined.runs
+                best = replace(refined if refined.exact or refined.misses_less_than(best) else best, runs=runs)
+            else:
+                best = refined
+            if best.exact or (found.slips_hopelessly and found.worst.violation <= FIRM_SOLVE.constr_viol_tol):
+                break
+        assert best is not None
+        return best
+
+    def _made_exact(
+        self, stage: RefineStage, found: Refined, start: WholeHand, margin: Margin, firmer: Margin | None
+    ) -> Refined:
+        """A motion on a stage's knots at the task's samples, with the firmer margin where it is exact with that."""
+        if firmer is not None and found.exact:
+            tight = self._named(stage, _after("firmer grip,", stage.take(SHORT_WAY, found.hand, firmer)))
+            tight = self._finer(stage, tight, start, firmer)
+            found = replace(found, runs=found.runs + tight.runs)
             if tight.exact:
-                return replace(tight, runs=longest.runs + tight.runs)
-            longest = replace(longest, runs=longest.runs + tight.runs)
-        return self._finer(stage, longest, start, margin)
-
-    def _on_few(self, find: Callable[[RefineStage], Refined], start: WholeHand, margin: Margin) -> Refined:
-        """A motion found on few knots, made exact at the task's samples."""
-        return self._finer(*self._found(find), start, margin)
-
-    def _found(self, find: Callable[[RefineStage], Refined]) -> tuple[RefineStage, Refined]:
-        """A motion found on sparse knots, or on coarse ones where that fails, with the stage it was found by."""
-        stage, found = self.sparse, self._named(self.sparse, find(self.sparse))
-        if not found.exact and not found.slips_hopelessly and self.coarse is not self.sparse:
-            again = self._named(self.coarse, find(self.coarse))
-            runs = found.runs + again.runs
-            if again.exact or again.misses_less_than(found):
-                stage, found = self.coarse, again
-            found = replace(found, runs=runs)
-        return stage, found
+                return replace(tight, runs=found.runs)
+        return self._finer(stage, found, start, margin)
 
     def _taken(self, way: tuple[Step, ...], start: WholeHand, margin: Margin, stage: RefineStage) -> Refined:
         """A motion solved on the knots of a stage."""
