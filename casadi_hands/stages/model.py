@@ -158,13 +158,9 @@ class Model:
 
     def slides(self, contact: int) -> bool:
         """Whether a finger's contact is planned to move on the object without lifting."""
-        if self.regrasp is None or self.lets_go(contact):
+        if self.regrasp is None or self.regrasp.lifted[:, contact].any():
             return False
         return bool(np.any(self.regrasp.patches[:, contact] != self.regrasp.patches[0, contact]))
-
-    def lets_go(self, contact: int) -> bool:
-        """Whether a finger's contact is planned to lift and to touch anew."""
-        return self.regrasp is not None and bool(self.regrasp.lifted[:, contact].any())
 
     @property
     def held_back(self) -> bool:

@@ -18,7 +18,6 @@ Array = NDArray[np.float64]
 EASED = 0.5  # s over which a contact that touches or lifts comes to press with its full force, or to let go
 TOOL_TOLERANCE = 5e-3  # half extents, how far a drawing's tool may leave its path between goals
 SLIDING_TIE = 0.3  # of a contact to where it was planned to slide; it shall roll if it can
-REGRASP_TIE = 3.0  # of one that lets go to where it was planned to touch anew
 Bounds = dict[str, tuple[ArrayLike, ArrayLike]]
 
 
@@ -166,7 +165,7 @@ class RefineValues:
             values[f"wanted_base{c}"], values[f"wanted_lengths{c}"] = finger.base, finger.lengths
             values[f"wanted_axes{c}"] = finger.axes.reshape(1, -1)
             values[f"capsule{c}"] = model.capsules[c]
-            values[f"tie{c}"] = SLIDING_TIE if model.slides(c) else REGRASP_TIE if model.lets_go(c) else 1.0
+            values[f"tie{c}"] = SLIDING_TIE if model.slides(c) else 1.0
             values[f"helper{c}"] = _helpers(motion.point[:, c], model.capsules[c])
         return values
 

@@ -14,7 +14,7 @@ from casadi_hands.design import Design
 from casadi_hands.stages import continuation
 from casadi_hands.stages.continuation import Continuation
 from casadi_hands.stages.floating import FloatingStage
-from casadi_hands.stages.model import Model, Regrasp, build_model
+from casadi_hands.stages.model import Model, build_model
 from casadi_hands.stages.outcome import design_change, hand_of, joint_loads, whole_hand_motion
 from casadi_hands.stages.refine import (
     ACCEPTED,
@@ -25,14 +25,7 @@ from casadi_hands.stages.refine import (
     Refined,
     Worst,
 )
-from casadi_hands.stages.refine_values import (
-    REGRASP_TIE,
-    SLIDING_TIE,
-    TOOL_TOLERANCE,
-    Margin,
-    RefineValues,
-    longest_run,
-)
+from casadi_hands.stages.refine_values import TOOL_TOLERANCE, Margin, longest_run
 from casadi_hands.stages.whole_hand import WholeHand
 from casadi_hands.task import Task, load_task
 from casadi_hands.verify import Audit, audit
@@ -162,18 +155,6 @@ def test_friction_keeps_its_margin_on_fingers_and_ground(made_up: MadeUp) -> Non
     given = made_up.stage.given.parameters(made_up.start, Margin(friction=0.25))
     assert given["friction"] == pytest.approx(0.25 * 0.6)
     assert given["ground_friction"] == pytest.approx(0.25 * 0.4)
-
-
-def test_a_contact_is_tied_to_its_plan_by_what_it_is_planned_to_do(made_up: MadeUp) -> None:
-    model = made_up.stage.model
-    keyframes = len(model.schedule.keyframes)
-    lifted, patches = np.zeros((keyframes, model.contacts), bool), model.keyframe_patches.copy()
-    lifted[1, 0] = True
-    patches[2:, [0, 2]] += 0.1
-    for plan, first, last in ((None, 1.0, 1.0), (Regrasp(lifted, patches), REGRASP_TIE, SLIDING_TIE)):
-        given = RefineValues(made_up.stage.built, replace(model, regrasp=plan)).parameters(made_up.start, Margin())
-        assert (given["tie0"], given["tie2"]) == (first, last)
-    assert REGRASP_TIE > 1 > SLIDING_TIE
 
 
 def test_a_result_has_every_contact_in_its_own_place(made_up: MadeUp) -> None:
