@@ -150,7 +150,7 @@ class Continuation:
                 best = replace(refined if refined.exact or refined.misses_less_than(best) else best, runs=runs)
             else:
                 best = refined
-            if best.exact or (found.slips_hopelessly and found.worst.violation <= FIRM_SOLVE.constr_viol_tol):
+            if found.exact or (found.slips_hopelessly and found.worst.violation <= FIRM_SOLVE.constr_viol_tol):
                 break
         assert best is not None
         return best

@@ -115,10 +115,10 @@ def test_where_fingers_cannot_roll_no_other_knots_are_tried(start: WholeHand) ->
     assert told.ways == [("sparse", LONG), ("coarse", LONG), ("fine", "exact")]
 
 
-def test_what_leads_nowhere_from_sparse_knots_is_begun_again_on_coarse_ones(start: WholeHand) -> None:
+def test_what_fails_on_coarse_knots_is_not_tried_on_dense_ones(start: WholeHand) -> None:
     told = Told(lambda level, share: level == "sparse")
     refined = told.solve(start, Margin())
-    assert told.ways == [("sparse", LONG), ("coarse", "exact"), ("coarse", SHORT), ("coarse", LONG)]
+    assert told.ways == [("sparse", LONG), ("coarse", "exact"), ("coarse", SHORT)]
     assert not refined.exact
     assert len(refined.hand.position) == len(MODEL.schedule.samples)
 
@@ -126,9 +126,8 @@ def test_what_leads_nowhere_from_sparse_knots_is_begun_again_on_coarse_ones(star
 def test_near_motions_take_the_short_way_and_the_long_one_where_it_fails(start: WholeHand) -> None:
     told = Told(lambda level, share: level != "fine")
     refined = told.solve(start, Margin(), near=True)
-    fine = [("fine", "exact"), ("fine", SHORT)]
-    ways = [[("sparse", way), ("coarse", "exact"), *fine, ("coarse", way), *fine] for way in (SHORT, LONG)]
-    assert told.ways == ways[0] + ways[1]
+    denser = [("coarse", "exact"), ("fine", "exact"), ("fine", SHORT)]
+    assert told.ways == [("sparse", SHORT), *denser, ("sparse", LONG), *denser]
     assert not refined.exact
     assert len(refined.runs) == sum(len(way.split()) for _, way in told.ways)
 
