@@ -240,7 +240,7 @@ def _refine(task: Task, model: Model, size: Size) -> Measured:
     way = tuple((what, weight, replace(how, max_iter=ITERATIONS)) for what, weight, how in LONG_WAY)
 
     def iterate(stage: RefineStage) -> list[Solution]:
-        return [solution for _, solution in stage.take(way, start, Margin()).runs]
+        return [run.solution for run in stage.take(way, start, Margin()).runs]
 
     return lambda: RefineStage(model, contacts, joints, start.active), iterate
 

@@ -163,6 +163,26 @@ class Refiner:
         planned = self.record.design
         stage = Continuation(self.model, whole.contacts, tuple(f.joints for f in whole.fingers), whole.active)
         refined = self._refined(stage, whole, margin, near, share)
+        judged, refined, stage = self._between(whole, refined, stage, short, planned)
+        if refined.exact and judged.status != "certified" and margin.normal_force < refined.margin.normal_force:
+            looser = self._regripped(whole, refined, stage, margin, f"again with a looser grip: {judged.reason}")
+            design, looser, halved = self._between(whole, looser, stage, short, planned)
+            if design.status == "certified":
+                judged, refined, stage = design, looser, halved
+        drops = self._drops(judged)
+        if drops > DROPS and refined.margin != FIRM:
+            text = f"again with a firmer grip: {drops} of {REPLAYS} replays dropped the object"
+            firmer = self._regripped(whole, refined, stage, FIRM, text)
+            design = self._judged(stage.model, firmer, short, planned)
+            fewer = self._drops(design) if design.status == "certified" else drops
+            if fewer < drops:
+                return design, firmer, fewer
+        return judged, refined, drops
+
+    def _between(
+        self, whole: WholeHand, refined: Refined, stage: Continuation, short: tuple[Reason, ...], planned: Design
+    ) -> tuple[Design, Refined, Continuation]:
+        """Judge a refinement; where it is exact but between samples, halve intervals as long as that helps."""
         judged = self._judged(stage.model, refined, short, planned)
         while refined.exact and judged.missed & BETWEEN:
             schedule = stage.model.schedule
@@ -179,16 +199,12 @@ class Refiner:
             if _excess(design) > GAIN * _excess(judged) and len(design.missed) >= len(judged.missed):
                 break
             judged, refined, stage = design, closer, halved
-        drops = self._drops(judged)
-        if drops > DROPS and refined.margin != FIRM:
-            text = f"again with a firmer grip: {drops} of {REPLAYS} replays dropped the object"
-            with self.record.stage("refine", text):
-                firmer = self._attempt(whole, FIRM, partial(stage.tighten, refined.hand))
-            design = self._judged(stage.model, firmer, short, planned)
-            fewer = self._drops(design) if design.status == "certified" else drops
-            if fewer < drops:
-                return design, firmer, fewer
-        return judged, refined, drops
+        return judged, refined, stage
+
+    def _regripped(self, whole: WholeHand, refined: Refined, stage: Continuation, margin: Margin, why: str) -> Refined:
+        """An exact motion refined with another margin."""
+        with self.record.stage("refine", why):
+            return self._attempt(whole, margin, partial(stage.regrip, refined.hand))
 
     def _refined(self, stage: Continuation, whole: WholeHand, margin: Margin, near: bool, share: float) -> Refined:
         """The refinement with this margin or, where that is not exact and another may be, with a small one.
@@ -206,14 +222,17 @@ class Refiner:
             return refined
         with self.record.stage("refine", "again, closer to the limits of friction and grip"):
             second = self._attempt(whole, SMALL, again)
-        return second if second.exact or second.misses_less_than(refined) else refined
+        return second if second.misses_less_than(refined) else refined
 
     def _attempt(self, whole: WholeHand, margin: Margin, way: Callable[..., Refined]) -> Refined:
         """Refine with one margin, and record all solves, whether they serve or not."""
         result = way(margin=margin)
-        what = f"hand, {margin.friction:g} of the friction and {margin.normal_force:g} weights of grip"
-        runs = [run_record("refine", what, self.record.task.search.seed, step, s) for step, s in result.runs]
-        runs[-1]["design_change"] = design_change(self.model, whole, result.hand)
+        runs = []
+        for step, solution, kept in result.runs:
+            what = f"hand, {kept.friction:g} of the friction and {kept.normal_force:g} weights of grip"
+            runs.append(run_record("refine", what, self.record.task.search.seed, step, solution))
+            if solution is result.hand.solution:
+                runs[-1]["design_change"] = design_change(self.model, whole, result.hand)
         self.record.add_runs(runs)
         return result
 

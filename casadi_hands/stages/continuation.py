@@ -1,14 +1,14 @@
 """Ways to an exact motion: on few knots before many, and where fingers must roll far, a part of the way before all.
 
-An exact motion on knots 0.2 s apart is near the one on dense knots, and costs half as much or less; what fails there
-would fail on dense knots too. Where contacts cannot go with the object, its whole motion is too far from anything a
-hand can do for a solver to find its way; a shorter one is not, and exact motions over more and more of the way lead
-from there to the goals, on knots that are half as many again.
+An exact motion on few knots is near the one on twice as many, and costs half as much or less: it is looked for on
+sparse knots and made exact on ever denser ones. Where contacts cannot go with the object, its whole motion is too far
+from anything a hand can do for a solver to find its way; a shorter one is not, and exact motions over more and more of
+the way lead from there to the goals.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import cached_property, partial
 
@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from casadi_hands.motion import held
-from casadi_hands.nlp import Solution
 from casadi_hands.stages.model import Model
-from casadi_hands.stages.refine import FIRM_SOLVE, LAST, LONG_WAY, RENEWED, SHORT_WAY, Refined, RefineStage, Step
+from casadi_hands.stages.refine import FIRM_SOLVE, LAST, LONG_WAY, RENEWED, SHORT_WAY, Refined, RefineStage, Run, Step
 from casadi_hands.stages.refine_values import Margin
 from casadi_hands.stages.sampling import at_rest, extrapolated, resampled, resampled_model
 from casadi_hands.stages.whole_hand import WholeHand
@@ -82,14 +81,10 @@ class Continuation:
             costs = self.fine.costs(SHORT_WAY[0], start, margin)
             if costs.get("slip", 0.0) + costs.get("passive_force", 0.0) < SERVES:
                 ways.insert(0, LAST)
-        runs: tuple[tuple[str, Solution], ...] = ()
-        for way in ways:
-            taken = partial(self._taken, way, start, margin)
-            refined = taken(self.fine) if way == LAST else self._on_few(taken, start, margin)
-            runs += refined.runs
-            if refined.exact:
-                break
-        return replace(refined, runs=runs)
+        return _until_met(
+            partial(self.fine.take, way, start, margin) if way == LAST else partial(self._on_few, way, start, margin)
+            for way in ways
+        )
 
     def renew(self, start: WholeHand, margin: Margin) -> Refined:
         """Refine a motion that was exact at other samples.
@@ -98,22 +93,17 @@ class Continuation:
             start: the motion, at the task's samples.
             margin: to keep to the limits.
         """
-        runs: tuple[tuple[str, Solution], ...] = ()
-        for way in (RENEWED, LAST):
-            refined = self.fine.take(way, start, margin)
-            runs += refined.runs
-            if refined.met:
-                break
-        return replace(refined, runs=runs)
+        return _until_met(partial(self.fine.take, way, start, margin) for way in (RENEWED, LAST))
 
-    def tighten(self, start: WholeHand, margin: Margin) -> Refined:
-        """Refine a motion that is exact with a smaller margin.
+    def regrip(self, start: WholeHand, margin: Margin) -> Refined:
+        """Refine a motion that is exact with another margin.
 
         Args:
             start: the motion.
             margin: to keep to the limits.
         """
-        return self._on_few(partial(self._taken, SHORT_WAY, start, margin), start, margin)
+        ways = partial(self._on_few, SHORT_WAY, start, margin), partial(self.fine.take, LAST, start, margin)
+        return _until_met(ways)
 
     def lengthen(self, start: WholeHand, share: float, margin: Margin, firmer: Margin | None = None) -> Refined:
         """Refine a motion over a share of the way to its goals, and lengthen it until it reaches them.
@@ -127,49 +117,35 @@ class Continuation:
         Returns:
             The motion over the whole way, or the longest exact one that was found.
         """
-        return self._on_few(partial(self._lengthened, start, share, margin), start, margin, firmer)
+        stage, found = self._found(partial(self._lengthened, start, share, margin))
+        if firmer is not None and found.exact:
+            tight = self._named(stage, stage.take(SHORT_WAY, found.hand, firmer))
+            tight = _after("firmer grip,", self._denser(stage, tight, start, firmer))
+            found = replace(found, runs=found.runs + tight.runs)
+            if tight.exact:
+                return replace(tight, runs=found.runs)
+        return self._denser(stage, found, start, margin)
 
-    def _on_few(
-        self,
-        find: Callable[[RefineStage], Refined],
-        start: WholeHand,
-        margin: Margin,
-        firmer: Margin | None = None,
-    ) -> Refined:
-        """A motion found on sparse knots, or on coarse ones where that fails, made exact at the task's samples.
+    def _on_few(self, way: tuple[Step, ...], start: WholeHand, margin: Margin) -> Refined:
+        """A motion solved on few knots and made exact at the task's samples, near the same motion all the while."""
+        stage, found = self._found(lambda stage: stage.take(way, self._at(stage, start), margin))
+        return self._denser(stage, found, start, margin, wanted=start)
+
+    def _found(self, find: Callable[[RefineStage], Refined]) -> tuple[RefineStage, Refined]:
+        """A motion found on sparse knots, or on coarse ones where that fails, and the stage with these knots.
 
         Few knots may be too few for a quick motion, but where one on them obeys physics and still slips far, one on
         more knots does, too.
         """
-        best: Refined | None = None
-        for stage in (self.sparse,) if self.coarse is self.sparse else (self.sparse, self.coarse):
-            found = self._named(stage, find(stage))
-            refined = self._made_exact(stage, found, start, margin, firmer)
-            if best is not None:
-                runs = best.runs + refined.runs
-                best = replace(refined if refined.exact or refined.misses_less_than(best) else best, runs=runs)
-            else:
-                best = refined
-            if found.exact or (found.slips_hopelessly and found.worst.violation <= FIRM_SOLVE.constr_viol_tol):
-                break
-        assert best is not None
-        return best
-
-    def _made_exact(
-        self, stage: RefineStage, found: Refined, start: WholeHand, margin: Margin, firmer: Margin | None
-    ) -> Refined:
-        """A motion on a stage's knots at the task's samples, with the firmer margin where it is exact with that."""
-        if firmer is not None and found.exact:
-            tight = self._named(stage, _after("firmer grip,", stage.take(SHORT_WAY, found.hand, firmer)))
-            tight = self._finer(stage, tight, start, firmer)
-            found = replace(found, runs=found.runs + tight.runs)
-            if tight.exact:
-                return replace(tight, runs=found.runs)
-        return self._finer(stage, found, start, margin)
-
-    def _taken(self, way: tuple[Step, ...], start: WholeHand, margin: Margin, stage: RefineStage) -> Refined:
-        """A motion solved on the knots of a stage."""
-        return stage.take(way, self._at(stage, start), margin)
+        stage, found = self.sparse, self._named(self.sparse, find(self.sparse))
+        surely_slips = found.slips_hopelessly and found.worst.violation <= FIRM_SOLVE.constr_viol_tol
+        if found.exact or surely_slips or self.coarse is self.sparse:
+            return stage, found
+        again = self._named(self.coarse, find(self.coarse))
+        runs = found.runs + again.runs
+        if again.misses_less_than(found):
+            stage, found = self.coarse, again
+        return stage, replace(found, runs=runs)
 
     def _lengthened(self, start: WholeHand, share: float, margin: Margin, stage: RefineStage) -> Refined:
         """The longest motion found on the knots of a stage."""
@@ -182,7 +158,7 @@ class Continuation:
             refined = _after(f"{share:.0%} of the way,", stage.take(LONG_WAY, begun, margin, share))
             runs += refined.runs
         longest, before, step = refined, at_rest(model, refined.hand), max((1 - share) / 3, SHORTEST)
-        before_share = 0.0
+        before_share, barely_rolls = 0.0, refined.barely_rolls
         while longest.met and longest.share < 1 and step >= SHORTEST:
             share = longest.share + step
             share = 1.0 if share > 1 - SHORTEST / 2 else share
@@ -194,28 +170,43 @@ class Continuation:
                 before, before_share, longest = longest.hand, longest.share, refined
             else:
                 step /= 2
-        return replace(longest, runs=runs)
+        return replace(longest, runs=runs, barely_rolls=barely_rolls)
 
-    def _finer(self, stage: RefineStage, refined: Refined, start: WholeHand, margin: Margin) -> Refined:
-        """A motion on a stage's knots at the task's samples, made exact on ever finer knots if it is on these."""
-        for finer in (self.coarse, self.fine):
-            if len(finer.model.schedule.samples) <= len(stage.model.schedule.samples):
+    def _denser(
+        self, stage: RefineStage, found: Refined, start: WholeHand, margin: Margin, wanted: WholeHand | None = None
+    ) -> Refined:
+        """A motion on a stage's knots at the task's samples, made exact on ever denser knots if it is on these.
+
+        Args:
+            stage: with the knots.
+            found: the motion.
+            start: what it is found from, at the task's samples; the palm goes as it does there.
+            margin: to keep to the limits.
+            wanted: the motion, at the task's samples, to stay near; by default what is found.
+        """
+        wanted = wanted or resampled(found.hand, stage.model, self.model)
+        for denser in (self.coarse, self.fine):
+            if len(denser.model.schedule.samples) <= len(stage.model.schedule.samples):
                 continue
-            hand, begun = resampled(refined.hand, stage.model, finer.model), self._at(finer, start)
+            begun, near = self._at(denser, start), self._at(denser, wanted)
             hand = replace(
-                hand, palm_position=begun.palm_position, palm_quaternion=begun.palm_quaternion, active=begun.active
+                resampled(found.hand, stage.model, denser.model),
+                palm_position=begun.palm_position,
+                palm_quaternion=begun.palm_quaternion,
+                active=begun.active,
             )
-            stage, before, refined = finer, refined, replace(refined, hand=hand)
+            stage, before = denser, found
+            found = replace(before, hand=hand)
             if not before.met:
                 continue
-            for way in (RENEWED, SHORT_WAY):
-                closer = self._named(finer, finer.take(way, hand, margin, before.share))
-                refined = replace(closer, runs=refined.runs + closer.runs)
-                if refined.met:
-                    break
-            if not refined.slips_hopelessly:
-                refined = replace(refined, slips=before.slips)
-        return refined
+            found, runs = denser.take(RENEWED, hand, margin, before.share, near), before.runs
+            if not found.met:
+                again = denser.take(SHORT_WAY, hand, margin, before.share, near)
+                better = again if again.misses_less_than(found) else found
+                found = replace(better, runs=found.runs + again.runs)
+            found = self._named(denser, found)
+            found = replace(found, runs=runs + found.runs, barely_rolls=before.barely_rolls)
+        return found
 
     def _at(self, stage: RefineStage, hand: WholeHand) -> WholeHand:
         """A motion with the task's samples on a stage's knots."""
@@ -228,6 +219,17 @@ class Continuation:
         return _after("coarse" if stage is self.coarse else "sparse", refined)
 
 
+def _until_met(ways: Iterable[Callable[[], Refined]]) -> Refined:
+    """What the first way gives that leads to an exact motion, or the last one, with the solves of all."""
+    runs: tuple[Run, ...] = ()
+    for way in ways:
+        refined = way()
+        runs += refined.runs
+        if refined.met:
+            break
+    return replace(refined, runs=runs)
+
+
 def _after(words: str, refined: Refined) -> Refined:
     """The same with words before the name of each solve."""
-    return replace(refined, runs=tuple((f"{words} {what}", solution) for what, solution in refined.runs))
+    return replace(refined, runs=tuple(run._replace(what=f"{words} {run.what}") for run in refined.runs))

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -82,6 +83,14 @@ class Worst:
     time: float | None
 
 
+class Run(NamedTuple):
+    """A solve: its step, what came out, and the margin to the limits that it kept."""
+
+    what: str
+    solution: Solution
+    margin: Margin
+
+
 @dataclass(frozen=True)
 class Refined:
     """A motion that was refined.
@@ -90,11 +99,13 @@ class Refined:
         hand: as the whole-hand stage's, with the design as it is now.
         met: whether every constraint is met within ``ACCEPTED``.
         worst: of the motion's constraints.
-        slips: for each contact the slip that its last soft solve was left with, half extents.
+        slips: for each contact, half extents, what the last solve left that did not forbid slip, or else the last.
         slips_hopelessly: whether the firm solves were left with so much slip that no exact one was tried.
-        runs: every solve: (what, solution).
+        barely_rolls: whether rolling is out of the structure's reach, or so nearly that a firmer solve had to look
+            for it.
+        runs: every solve.
         weights: of the terms of the motion's solve.
-        margin: to keep to the limits, that it was solved with.
+        margin: to keep to the limits, that the motion was solved with.
         share: of the way to its goals that the motion goes.
     """
 
@@ -103,7 +114,8 @@ class Refined:
     worst: Worst
     slips: dict[str, float]
     slips_hopelessly: bool
-    runs: tuple[tuple[str, Solution], ...]
+    barely_rolls: bool
+    runs: tuple[Run, ...]
     weights: dict[str, float]
     margin: Margin
     share: float = 1.0
@@ -114,13 +126,12 @@ class Refined:
         return self.met and self.share == 1
 
     def misses_less_than(self, other: Refined) -> bool:
-        """Whether the motion goes farther, or as far with less violation."""
-        return (-self.share, self.worst.violation) < (-other.share, other.worst.violation)
+        """Whether the motion is exact where the other is not, goes farther, rolls where it slips, or violates less."""
 
-    @property
-    def barely_rolls(self) -> bool:
-        """Whether rolling is out of the structure's reach, or so nearly that a firmer solve had to look for it."""
-        return self.slips_hopelessly or any(what.endswith("firmer") for what, _ in self.runs)
+        def missed(refined: Refined) -> tuple[bool, float, bool, float]:
+            return not refined.met, -refined.share, refined.slips_hopelessly, refined.worst.violation
+
+        return missed(self) < missed(other)
 
 
 class RefineStage:
@@ -135,7 +146,14 @@ class RefineStage:
         self.problem, self.given = self.built.problem, RefineValues(self.built, model)
         self.solver = Solver(self.problem)
 
-    def take(self, way: tuple[Step, ...], start: WholeHand, margin: Margin, share: float = 1.0) -> Refined:
+    def take(
+        self,
+        way: tuple[Step, ...],
+        start: WholeHand,
+        margin: Margin,
+        share: float = 1.0,
+        wanted: WholeHand | None = None,
+    ) -> Refined:
         """Solve step by step; not to the end where firm solves show rolling to be out of reach.
 
         Args:
@@ -143,12 +161,13 @@ class RefineStage:
             start: the motion to begin with.
             margin: to keep to the limits.
             share: of the way from the first goal to each of the others.
+            wanted: the motion, of the same hand, that costs hold near to; by default that to begin with.
         """
         given = self.given if share == 1 else RefineValues(self.built, shortened(self.model, share))
-        values, parameters = given.start(start), given.parameters(start, margin)
+        values, parameters = given.start(start), given.parameters(start, margin, wanted)
         lower, upper = given.bounds()
         always, exact = given.constraint_bounds(margin)
-        runs: list[tuple[str, Solution]] = []
+        runs: list[Run] = []
         slips: dict[str, float] = {}
         most = 0.0
         for what, weights, options in way:
@@ -160,11 +179,11 @@ class RefineStage:
             bounds = always | exact if what == "exact" else always
             parameters |= self._weighted(weights)
             solution = self.solver.solve(values, parameters, options, lower, upper, bounds)
-            runs.append((what, solution))
+            runs.append(Run(what, solution, margin))
             values, used = solution.values, weights
             if what != "exact":
                 slips = self._slips(solution)
-        return replace(self._result(start, runs, slips or self._slips(solution), used, margin), share=share)
+        return replace(self._result(start, runs, slips or self._slips(solution), used), share=share)
 
     def costs(self, step: Step, start: WholeHand, margin: Margin) -> dict[str, float]:
         """The weighted terms of a motion, as a step weights them."""
@@ -179,15 +198,8 @@ class RefineStage:
         names = {self.model.contact_names[c]: f"rolling{c}.no_slip" for c in self.contacts}
         return {who: float(np.linalg.norm(solution.constraints[name], axis=1).sum()) for who, name in names.items()}
 
-    def _result(
-        self,
-        start: WholeHand,
-        runs: list[tuple[str, Solution]],
-        slips: dict[str, float],
-        weights: dict[str, float],
-        margin: Margin,
-    ) -> Refined:
-        solution = runs[-1][1]
+    def _result(self, start: WholeHand, runs: list[Run], slips: dict[str, float], weights: dict[str, float]) -> Refined:
+        what, solution, margin = runs[-1]
         values, count = solution.values, len(self.model.schedule.samples)
         point, force, active = start.point.copy(), np.zeros_like(start.force), np.zeros_like(start.active)
         columns = self.structure.columns
@@ -216,9 +228,10 @@ class RefineStage:
             solution=solution,
         )
         worst = self._worst(solution)
-        hopeless = runs[-1][0] != "exact"
+        hopeless = what != "exact"
         met = not hopeless and worst.violation <= ACCEPTED
-        return Refined(hand, met, worst, slips, hopeless, tuple(runs), weights, margin)
+        barely = hopeless or any(run.what == "firmer" for run in runs)
+        return Refined(hand, met, worst, slips, hopeless, barely, tuple(runs), weights, margin)
 
     def _worst(self, solution: Solution) -> Worst:
         name, violation = max(solution.violations.items(), key=lambda item: item[1])

@@ -129,9 +129,9 @@ class RefineValues:
             values[f"axes{c}"] = finger.axes.reshape(1, -1)
         return values
 
-    def parameters(self, motion: WholeHand, margin: Margin) -> dict[str, ArrayLike]:
-        """Values of all parameters but the weights; the motion is where costs hold what may be elsewhere."""
-        model = self.model
+    def parameters(self, motion: WholeHand, margin: Margin, wanted: WholeHand | None = None) -> dict[str, ArrayLike]:
+        """Values of all parameters but the weights; costs hold a motion near to the wanted one, by default itself."""
+        model, wanted = self.model, wanted or motion
         values: dict[str, ArrayLike] = {
             "reference": model.reference,
             "gravity": model.gravity,
@@ -146,7 +146,7 @@ class RefineValues:
             "step": np.diff(model.schedule.samples)[:, None],
             "palm_position": motion.palm_position,
             "palm_quaternion": motion.palm_quaternion,
-            "wanted_pose": np.hstack([motion.position, motion.vector]),
+            "wanted_pose": np.hstack([wanted.position, wanted.vector]),
         }
         if len(self.pushed):
             values["push_force"] = model.perturbation_force[self.pushed]
@@ -159,8 +159,8 @@ class RefineValues:
             values["ground_friction"] = margin.friction * model.ground.friction
             values[f"capsule{model.contacts}"] = model.ground.capsule
         for c in self.structure.columns:
-            values[f"wanted_point{c}"], values[f"wanted_force{c}"] = motion.point[:, c], motion.force[:, c]
-        for c, finger in zip(self.structure.contacts, motion.fingers, strict=True):
+            values[f"wanted_point{c}"], values[f"wanted_force{c}"] = wanted.point[:, c], wanted.force[:, c]
+        for c, finger in zip(self.structure.contacts, wanted.fingers, strict=True):
             values[f"frames{c}"] = finger.frames.transpose(0, 2, 1).reshape(1, -1)
             values[f"wanted_base{c}"], values[f"wanted_lengths{c}"] = finger.base, finger.lengths
             values[f"wanted_axes{c}"] = finger.axes.reshape(1, -1)

@@ -17,17 +17,23 @@ Array = NDArray[np.float64]
 
 
 def resampled_model(model: Model, schedule: Schedule) -> Model:
-    """The task with other samples between the same keyframes; a perturbation lasts to the next of its own samples."""
+    """The task with other samples between the same keyframes.
+
+    A perturbation lasts to the next of its own samples; of those that act before the next knot a knot has the largest.
+    """
     was, now = model.schedule.samples, schedule.samples
-    between, last = catmull_rom(was, now), held(was, now)
+    between, first = catmull_rom(was, now), held(was, now)
+    end = np.append(np.searchsorted(was, now[1:] - 1e-9), len(was))
+    size = np.linalg.norm(np.hstack([model.perturbation_force, model.perturbation_torque]), axis=1)
+    largest = np.array([i + np.argmax(size[i : max(i + 1, j)]) for i, j in zip(first, end, strict=True)])
     quaternion = between @ continuous(model.palm_quaternion)
     return replace(
         model,
         schedule=schedule,
         palm_position=between @ model.palm_position,
         palm_quaternion=quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True),
-        perturbation_force=model.perturbation_force[last],
-        perturbation_torque=model.perturbation_torque[last],
+        perturbation_force=model.perturbation_force[largest],
+        perturbation_torque=model.perturbation_torque[largest],
     )
 
 

@@ -17,7 +17,7 @@ from casadi_hands.pipeline.certify import AMPLE, FIRM, REPLAYS, Certifier, Refin
 from casadi_hands.pipeline.record import Record
 from casadi_hands.search.algorithm import Candidate, Found
 from casadi_hands.stages.model import build_model
-from casadi_hands.stages.refine import Worst
+from casadi_hands.stages.refine import Run, Worst
 from casadi_hands.stages.refine_values import Margin
 from casadi_hands.task import parse_task
 from casadi_hands.verify.report import Audit, Figure
@@ -176,19 +176,28 @@ def test_a_simulator_that_cannot_be_loaded_costs_no_certified_design(monkeypatch
 def test_what_a_firmer_grip_changes_is_told_from_the_hand_before_any_refinement(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    whole, exact, firm = object(), object(), object()
+    whole, exact, solution = object(), object(), made_up_solution({})
+    firm = SimpleNamespace(solution=solution)
     asked: list[Any] = []
 
     def solve(start: object, margin: Margin, near: bool) -> Any:
         asked.append((start, margin, near))
-        return SimpleNamespace(hand=firm, runs=(("exact", made_up_solution({})),))
+        other = Run("firm", made_up_solution({}), AMPLE)
+        return SimpleNamespace(hand=firm, runs=(other, Run("exact", solution, FIRM), other))
 
     told: Any = {}
     monkeypatch.setattr(certify, "design_change", lambda _, before, after: {"from": before, "to": after})
     record = Record(ball_task(), None, lambda _: None)
     Refiner(record, told, told, 1)._attempt(whole, FIRM, partial(solve, exact, near=True))  # type: ignore[arg-type]
     assert asked == [(exact, FIRM, True)]
-    assert record.design.stages[-1]["design_change"] == {"from": whole, "to": firm}
+    changes = [run.get("design_change") for run in record.design.stages]
+    assert changes == [None, {"from": whole, "to": firm}, None]
+    # Each solve is told with the margin that it kept, whatever was asked for at first.
+    assert [run["what"].split("friction and ")[1] for run in record.design.stages] == [
+        "1 weights of grip",
+        "2 weights of grip",
+        "1 weights of grip",
+    ]
 
 
 @pytest.mark.parametrize(("missed", "again"), [("slip", 2), ("goal_angle", 0)])
@@ -238,37 +247,83 @@ def test_what_is_missed_only_between_samples_gets_more_of_them(
     assert drops == 0
 
 
-@pytest.mark.parametrize(("share", "got", "renewed"), [(1.0, AMPLE, True), (0.5, AMPLE, True), (0.5, FIRM, False)])
-def test_a_long_way_is_gone_with_a_firm_grip_at_once_where_it_can_be(
-    monkeypatch: pytest.MonkeyPatch, share: float, got: Margin, renewed: bool
-) -> None:
-    asked: list[tuple[str, Any]] = []
+class Ways:
+    """A continuation whose refinements are all exact; ``asked`` has their names and margins.
 
-    def taken(name: str, margin: Margin) -> Any:
-        asked.append((name, margin))
+    Args:
+        firm: whether a long way is gone with the firm grip.
+    """
+
+    model, contacts, joints = None, (0, 1), (1, 1)
+
+    def __init__(self, firm: bool) -> None:
+        self.firm = firm
+        self.asked: list[tuple[str, Margin]] = []
+
+    def taken(self, name: str, margin: Margin) -> Any:
+        self.asked.append((name, margin))
         return SimpleNamespace(exact=True, barely_rolls=False, hand=None, runs=(), weights={}, margin=margin)
 
-    def lengthen(start: Any, part: float, margin: Margin, firmer: Margin) -> Any:
-        assert (part, margin, firmer) == (0.5, AMPLE, FIRM)
-        return taken("lengthen", got)
+    def solve(self, start: Any, margin: Margin, near: bool) -> Any:
+        return self.taken("solve", margin)
 
-    stage = SimpleNamespace(
-        model=None,
-        lengthen=lengthen,
-        solve=lambda start, margin, near: taken("solve", margin),
-        tighten=lambda start, margin: taken("tighten", margin),
-    )
-    monkeypatch.setattr(certify, "Continuation", lambda *_: stage)
+    def lengthen(self, start: Any, share: float, margin: Margin, firmer: Margin) -> Any:
+        assert (share, margin, firmer) == (0.5, AMPLE, FIRM)
+        return self.taken("lengthen", firmer if self.firm else margin)
+
+    def regrip(self, start: Any, margin: Margin) -> Any:
+        return self.taken("regrip", margin)
+
+
+def refine(
+    monkeypatch: pytest.MonkeyPatch, ways: Ways, share: float, statuses: list[str], drops: list[int]
+) -> tuple[Margin, int]:
+    """The margin of what is kept and its drops, where designs and drops are judged as told, in this order."""
+    judged, dropped = iter(statuses), iter(drops)
+    monkeypatch.setattr(certify, "Continuation", lambda *_: ways)
     monkeypatch.setattr(Refiner, "_attempt", lambda self, whole, margin, way: way(margin=margin))
-    monkeypatch.setattr(Refiner, "_judged", lambda self, *_: replace(self.record.design, status="certified"))
-    monkeypatch.setattr(Refiner, "_drops", lambda self, design: 4)
+    monkeypatch.setattr(Refiner, "_judged", lambda self, *_: replace(self.record.design, status=next(judged)))
+    monkeypatch.setattr(Refiner, "_drops", lambda self, design: next(dropped) if design.status == "certified" else 0)
     whole: Any = SimpleNamespace(contacts=(0, 1), fingers=(), active=None)
-    record = Record(ball_task(), None, lambda _: None)
-    unused: Any = None
-    *_, drops = Refiner(record, unused, unused, 1).certify(whole, (), share=share)
-    first = ("solve", AMPLE) if share == 1 else ("lengthen", got)
-    assert asked == [first, *[("tighten", FIRM)] * renewed]
-    assert drops == 4
+    record, unused = Record(ball_task(), None, lambda _: None), SimpleNamespace()
+    refiner = Refiner(record, unused, unused, 1)  # type: ignore[arg-type]
+    _, refined, least = refiner.certify(whole, (), share=share)
+    assert (next(judged, None), next(dropped, None)) == (None, None)
+    return refined.margin, least
+
+
+@pytest.mark.parametrize("share", [1.0, 0.5])
+@pytest.mark.parametrize(("drops", "kept"), [([4, 2], FIRM), ([4, 4], AMPLE), ([4, 5], AMPLE), ([1], AMPLE)])
+def test_a_firmer_grip_is_tried_where_replays_drop_and_kept_where_they_drop_less(
+    monkeypatch: pytest.MonkeyPatch, share: float, drops: list[int], kept: Margin
+) -> None:
+    ways = Ways(firm=False)
+    assert refine(monkeypatch, ways, share, ["certified"] * len(drops), drops) == (kept, min(drops))
+    first = ("solve" if share == 1 else "lengthen", AMPLE)
+    assert ways.asked == [first, *[("regrip", FIRM)] * (len(drops) - 1)]
+
+
+def test_a_long_way_is_gone_with_a_firm_grip_at_once_where_it_can_be(monkeypatch: pytest.MonkeyPatch) -> None:
+    ways = Ways(firm=True)
+    assert refine(monkeypatch, ways, 0.5, ["certified"], [4]) == (FIRM, 4)
+    assert ways.asked == [("lengthen", FIRM)]
+
+
+@pytest.mark.parametrize(
+    ("statuses", "drops", "kept"),
+    [
+        (["feasible", "certified"], [0], AMPLE),
+        (["feasible", "certified", "certified"], [4, 4], AMPLE),
+        (["feasible", "feasible"], [], FIRM),
+    ],
+)
+def test_where_the_audit_refuses_a_firm_grip_over_a_long_way_the_looser_one_is_judged(
+    monkeypatch: pytest.MonkeyPatch, statuses: list[str], drops: list[int], kept: Margin
+) -> None:
+    ways = Ways(firm=True)
+    margin, _ = refine(monkeypatch, ways, 0.5, statuses, drops)
+    assert margin == kept
+    assert ways.asked[:2] == [("lengthen", FIRM), ("regrip", AMPLE)]
 
 
 def test_intervals_that_use_up_a_limit_and_their_neighbours_are_halved() -> None:

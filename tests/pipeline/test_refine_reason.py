@@ -10,7 +10,7 @@ import pytest
 
 from casadi_hands.pipeline.refine_reason import failing_fingers, refined_reason
 from casadi_hands.stages.model import Model, build_model
-from casadi_hands.stages.refine import Refined, Worst
+from casadi_hands.stages.refine import Refined, Run, Worst
 from casadi_hands.stages.refine_values import Margin
 from casadi_hands.task import parse_task
 from tests.search.example import BALL
@@ -29,9 +29,9 @@ def refined(
 ) -> Refined:
     """A refinement that is left with one violation."""
     hand = SimpleNamespace(contacts=(0, 1), fingers=(SimpleNamespace(joints=2), SimpleNamespace(joints=1)))
-    slips, runs = {"left": 0.02, "right": 0.4}, ((step, made_up_solution({})),)
+    slips, runs = {"left": 0.02, "right": 0.4}, (Run(step, made_up_solution({}), Margin()),)
     worst, slips_hopelessly = Worst(constraint, violation, time), not step.endswith("exact")
-    return Refined(hand, False, worst, slips, slips_hopelessly, runs, {}, Margin(), share)  # type: ignore[arg-type]
+    return Refined(hand, False, worst, slips, slips_hopelessly, slips_hopelessly, runs, {}, Margin(), share)  # type: ignore[arg-type]
 
 
 def test_an_exact_motion_needs_no_reason() -> None:

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from casadi_hands.stages.continuation import SHORTEST, Continuation
-from casadi_hands.stages.refine import LONG_WAY, SHORT_WAY, Refined, Worst
+from casadi_hands.stages.refine import LONG_WAY, SHORT_WAY, Refined, Run, Worst
 from casadi_hands.stages.refine_values import Margin
-from casadi_hands.stages.sampling import resampled_model
+from casadi_hands.stages.sampling import resampled, resampled_model
 from casadi_hands.stages.whole_hand import WholeHand
 from tests.stages.example import everything, made_up_solution, standing
 from tests.stages.refining import carrying
@@ -38,26 +38,40 @@ class Told(Continuation):
     Attributes:
         taken: for each solve its knots, the steps of its way, the share, and where the object was at the end of what it
             began with.
+        wanted: for each solve the motion that its costs hold near to, at its knots.
     """
 
-    def __init__(self, exact: Callable[[str, float], bool], hopeless: bool = False, violation: float = 0.0) -> None:
+    def __init__(
+        self,
+        exact: Callable[[str, float, Margin], bool],
+        hopeless: Callable[[str, str], bool] = lambda level, way: False,
+        violation: float = 0.0,
+        firmer_on: str = "",
+    ) -> None:
         super().__init__(MODEL, (0, 2), (1, 2), np.ones((len(MODEL.schedule.samples), MODEL.contacts + 1), bool))
         self.taken: list[tuple[str, str, float, float]] = []
-        self.exact_where, self.hopeless, self.violation = exact, hopeless, violation
+        self.wanted: list[WholeHand] = []
+        self.exact_where, self.hopeless, self.violation, self.firmer_on = exact, hopeless, violation, firmer_on
         self.sparse, self.coarse, self.fine = (self._stage(level) for level in LEVELS)  # type: ignore[misc]
 
     def _stage(self, level: str) -> Any:
         model = LEVELS[level]
 
-        def take(way: Any, hand: WholeHand, margin: Margin, share: float = 1.0) -> Refined:
-            assert len(hand.position) == len(model.schedule.samples)
+        def take(
+            way: Any, hand: WholeHand, margin: Margin, share: float = 1.0, wanted: WholeHand | None = None
+        ) -> Refined:
+            wanted = wanted or hand
+            assert len(hand.position) == len(wanted.position) == len(model.schedule.samples)
+            self.wanted.append(wanted)
             self.taken.append((level, " ".join(step[0] for step in way), share, float(hand.position[-1, 0])))
-            runs = tuple((step[0], made_up_solution({})) for step in way)
+            runs = tuple(Run(step[0], made_up_solution({}), margin) for step in way)
             moved = SimpleNamespace(**vars(hand))
             moved.position = hand.position[:1] + share * np.linspace(0, 1, len(hand.position))[:, None]
-            result, slips = WholeHand(**vars(moved)), {level: share}
-            exact, worst = self.exact_where(level, share), Worst("a.b", self.violation, None)
-            return Refined(result, exact, worst, slips, self.hopeless and not exact, runs, {}, margin, share)
+            result, worst = WholeHand(**vars(moved)), Worst("a.b", self.violation, None)
+            exact = self.exact_where(level, share, margin)
+            hopeless = not exact and self.hopeless(level, names(way))
+            barely = hopeless or level == self.firmer_on
+            return Refined(result, exact, worst, {level: share}, hopeless, barely, runs, {}, margin, share)
 
         return SimpleNamespace(model=model, take=take, costs=lambda *_: {"slip": 1.0, "passive_force": 0.0})
 
@@ -79,22 +93,30 @@ LONG, SHORT = names(LONG_WAY), names(SHORT_WAY)
 
 
 def test_a_motion_is_made_exact_on_ever_denser_knots(start: WholeHand) -> None:
-    told = Told(lambda level, share: True)
+    told = Told(lambda level, share, margin: True)
     refined = told.solve(start, Margin())
     assert told.ways == [("sparse", LONG), ("coarse", "exact"), ("fine", "exact")]
     assert refined.exact
-    assert [what for what, _ in refined.runs] == [*(f"sparse {step[0]}" for step in LONG_WAY), "coarse exact", "exact"]
-    assert refined.slips == {"sparse": 1.0}
+    assert [run.what for run in refined.runs] == [*(f"sparse {step[0]}" for step in LONG_WAY), "coarse exact", "exact"]
     assert len(refined.hand.position) == len(MODEL.schedule.samples)
     # The palm goes as it did, not as sparse samples of it.
     np.testing.assert_array_equal(refined.hand.palm_position, start.palm_position)
 
 
+def test_the_motion_stays_near_the_first_on_all_knots(start: WholeHand) -> None:
+    told = Told(lambda level, share, margin: True)
+    told.solve(start, Margin())
+    assert told.wanted[-1] is start
+    for wanted, level in zip(told.wanted, LEVELS, strict=True):
+        np.testing.assert_allclose(wanted.point, resampled(start, MODEL, LEVELS[level]).point, atol=1e-12)
+    assert told.taken[1][3] != told.wanted[1].position[-1, 0]
+
+
 def test_what_fails_on_sparse_knots_is_tried_on_coarse_but_not_on_dense_ones(start: WholeHand) -> None:
-    told = Told(lambda level, share: level != "sparse")
+    told = Told(lambda level, share, margin: level != "sparse")
     assert told.solve(start, Margin()).exact
     assert told.ways == [("sparse", LONG), ("coarse", LONG), ("fine", "exact")]
-    told = Told(lambda level, share: False)
+    told = Told(lambda level, share, margin: False)
     refined = told.solve(start, Margin())
     assert told.ways == [("sparse", LONG), ("coarse", LONG)]
     assert not refined.exact
@@ -104,19 +126,53 @@ def test_what_fails_on_sparse_knots_is_tried_on_coarse_but_not_on_dense_ones(sta
 
 
 def test_where_fingers_cannot_roll_no_other_knots_are_tried(start: WholeHand) -> None:
-    told = Told(lambda level, share: False, hopeless=True)
+    told = Told(lambda level, share, margin: False, hopeless=lambda level, way: True)
     refined = told.solve(start, Margin())
     assert told.ways == [("sparse", LONG)]
     assert refined.slips_hopelessly
+    assert refined.barely_rolls
     assert refined.slips == {"sparse": 1.0}
     # Without physics, slip says nothing: there may be too few knots.
-    told = Told(lambda level, share: level != "sparse", hopeless=True, violation=1e-3)
+    told = Told(lambda level, share, margin: level != "sparse", hopeless=lambda level, way: True, violation=1e-3)
     assert told.solve(start, Margin()).exact
     assert told.ways == [("sparse", LONG), ("coarse", LONG), ("fine", "exact")]
 
 
+def test_what_misses_less_is_exact_goes_farther_rolls_or_violates_less(start: WholeHand) -> None:
+    exact = Refined(start, True, Worst("a", 1e-9, None), {}, False, False, (), {}, Margin(), 0.5)
+    farther = replace(exact, met=False, worst=Worst("a", 1e-3, None), share=0.9)
+    whole = replace(farther, share=1.0)
+    slips = replace(whole, slips_hopelessly=True, worst=Worst("b", 1e-6, None))
+    far = replace(whole, worst=Worst("a", 1.0, None))
+    ranked = [replace(exact, share=1.0), exact, whole, far, slips, farther]
+    for i, better in enumerate(ranked):
+        assert [better.misses_less_than(other) for other in ranked] == [i < k for k in range(len(ranked))]
+
+
+def test_what_slips_only_on_coarse_knots_is_not_said_to_slip(start: WholeHand) -> None:
+    # On sparse knots it rolls, and near that motion it misses less than where firm solves go from there.
+    told = Told(lambda level, share, margin: level == "sparse", hopeless=lambda level, way: way == SHORT)
+    refined = told.solve(start, Margin())
+    assert told.ways == [("sparse", LONG), ("coarse", "exact"), ("coarse", SHORT)]
+    assert not refined.slips_hopelessly
+    assert not refined.barely_rolls
+    steps = ["exact", *(step[0] for step in SHORT_WAY)]
+    assert [run.what for run in refined.runs[len(LONG_WAY) :]] == [f"coarse {step}" for step in steps]
+
+
+@pytest.mark.parametrize("firmer_on", ["", "sparse", "coarse"])
+@pytest.mark.parametrize("exact_on", ["sparse", "coarse"])
+def test_what_is_found_rolls_barely_where_its_own_knots_took_a_firmer_solve(
+    start: WholeHand, firmer_on: str, exact_on: str
+) -> None:
+    told = Told(lambda level, share, margin: level != "sparse" or exact_on == "sparse", firmer_on=firmer_on)
+    assert told.solve(start, Margin()).barely_rolls == (firmer_on == exact_on)
+    told.taken.clear()
+    assert told.lengthen(start, 0.5, Margin()).barely_rolls == (firmer_on == exact_on)
+
+
 def test_what_fails_on_coarse_knots_is_not_tried_on_dense_ones(start: WholeHand) -> None:
-    told = Told(lambda level, share: level == "sparse")
+    told = Told(lambda level, share, margin: level == "sparse")
     refined = told.solve(start, Margin())
     assert told.ways == [("sparse", LONG), ("coarse", "exact"), ("coarse", SHORT)]
     assert not refined.exact
@@ -124,7 +180,7 @@ def test_what_fails_on_coarse_knots_is_not_tried_on_dense_ones(start: WholeHand)
 
 
 def test_near_motions_take_the_short_way_and_the_long_one_where_it_fails(start: WholeHand) -> None:
-    told = Told(lambda level, share: level != "fine")
+    told = Told(lambda level, share, margin: level != "fine")
     refined = told.solve(start, Margin(), near=True)
     denser = [("coarse", "exact"), ("fine", "exact"), ("fine", SHORT)]
     assert told.ways == [("sparse", SHORT), *denser, ("sparse", LONG), *denser]
@@ -133,7 +189,7 @@ def test_near_motions_take_the_short_way_and_the_long_one_where_it_fails(start: 
 
 
 def test_a_motion_is_lengthened_until_it_reaches_its_goals(start: WholeHand) -> None:
-    told = Told(lambda level, share: True)
+    told = Told(lambda level, share, margin: True)
     refined = told.lengthen(start, 0.5, Margin())
     assert told.shares(*LEVELS) == pytest.approx([0.5, 2 / 3, 5 / 6, 1.0, 1.0, 1.0])
     assert told.ways == [("sparse", LONG), *3 * [("sparse", SHORT)], ("coarse", "exact"), ("fine", "exact")]
@@ -146,12 +202,13 @@ def test_a_motion_is_lengthened_until_it_reaches_its_goals(start: WholeHand) -> 
 
 
 def test_steps_get_shorter_where_they_fail_and_the_longest_exact_motion_is_kept(start: WholeHand) -> None:
-    told = Told(lambda level, share: share < 0.8)
+    told = Told(lambda level, share, margin: share < 0.8)
     refined = told.lengthen(start, 0.1, Margin())
     tried = [0.1, 0.4, 0.7, 1.0, 0.85, 0.775, 0.85]
     assert told.shares("sparse") == pytest.approx(tried)
-    # Made exact there, and begun again; it gets no farther, and what is found first is kept.
-    assert told.shares("coarse") == pytest.approx([refined.share, *tried])
+    # On coarse knots it gets no farther: what was found first is made exact there.
+    assert told.shares("coarse") == pytest.approx([*tried, refined.share])
+    assert told.shares("fine") == [refined.share]
     assert refined.share == pytest.approx(0.775)
     assert not refined.exact
     assert told.taken[-1][:3] == ("fine", "exact", refined.share)
@@ -159,23 +216,28 @@ def test_steps_get_shorter_where_they_fail_and_the_longest_exact_motion_is_kept(
 
 
 def test_what_goes_farther_on_coarse_knots_is_kept(start: WholeHand) -> None:
-    told = Told(lambda level, share: level != "sparse" or share < 0.6)
+    told = Told(lambda level, share, margin: level != "sparse" or share < 0.6)
     refined = told.lengthen(start, 0.5, Margin())
-    longest = max(share for share in told.shares("sparse") if share < 0.6)
-    assert told.shares("coarse") == pytest.approx([longest, 0.5, 2 / 3, 5 / 6, 1.0])
+    assert told.shares("coarse") == pytest.approx([0.5, 2 / 3, 5 / 6, 1.0])
     assert refined.exact
-    assert told.taken[-1][:3] == ("fine", "exact", 1.0)
+    assert told.shares("fine") == [1.0]
+
+
+def test_an_exact_motion_is_not_given_up_for_a_longer_one_that_is_not(start: WholeHand) -> None:
+    told = Told(lambda level, share, margin: share < {"sparse": 0.8, "coarse": 0.1, "fine": 0.8}[level])
+    refined = told.lengthen(start, 0.5, Margin())
+    assert refined.share == max(share for share in told.shares("sparse") if share < 0.8)
 
 
 def test_a_motion_of_which_no_part_is_exact_is_not_lengthened(start: WholeHand) -> None:
-    told = Told(lambda level, share: False)
+    told = Told(lambda level, share, margin: False)
     refined = told.lengthen(start, 0.5, Margin())
     assert told.shares(*LEVELS) == 2 * [0.5, 0.25, 0.125]
     assert (refined.exact, refined.share) == (False, 0.125)
 
 
 def test_where_the_first_part_fails_a_shorter_one_is_looked_for(start: WholeHand) -> None:
-    told = Told(lambda level, share: share < 0.3 or len(told.taken) > 1)
+    told = Told(lambda level, share, margin: share < 0.3 or len(told.taken) > 1)
     refined = told.lengthen(start, 0.5, Margin())
     assert told.shares("sparse") == pytest.approx([0.5, 0.25, 0.5, 0.75, 1.0])
     first, second = (place for *_, place in told.taken[:2])
@@ -184,21 +246,27 @@ def test_where_the_first_part_fails_a_shorter_one_is_looked_for(start: WholeHand
 
 
 @pytest.mark.parametrize("fails_on", ["", "sparse", "coarse", "fine"])
-def test_a_firmer_grip_is_kept_where_it_is_exact(start: WholeHand, fails_on: str) -> None:
-    firm, lengthened = Margin(normal_force=2.0), 4
-    told = Told(lambda level, share: level != fails_on or len(told.taken) <= lengthened)
+def test_a_firmer_grip_is_kept_where_it_is_exact_and_the_other_one_elsewhere(start: WholeHand, fails_on: str) -> None:
+    firm = Margin(normal_force=2.0)
+    told = Told(lambda level, share, margin: not (margin == firm and level == fails_on))
     refined = told.lengthen(start, 0.5, Margin(), firm)
-    denser = [("sparse", SHORT), ("coarse", "exact"), ("fine", "exact")]
-    if not fails_on:
-        assert told.ways[lengthened:] == denser
-    assert refined.exact == (fails_on in ("", "sparse"))
+    assert refined.exact
     assert refined.margin == (Margin() if fails_on else firm)
-    assert len(refined.runs) == sum(len(way.split()) for _, way in told.ways)
-    assert "sparse firmer grip, firm" in [what for what, _ in refined.runs]
+    steps = {
+        "": ["sparse firm", "sparse exact", "coarse exact", "exact"],
+        "sparse": ["sparse firm", "sparse exact"],
+        "coarse": ["sparse firm", "sparse exact", "coarse exact", "coarse firm", "coarse exact"],
+        "fine": ["sparse firm", "sparse exact", "coarse exact", "exact", "firm", "exact"],
+    }[fails_on]
+    assert [run.what for run in refined.runs if run.margin == firm] == [f"firmer grip, {step}" for step in steps]
+    if fails_on:
+        assert [run.what for run in refined.runs[-2:]] == ["coarse exact", "exact"]
+    # The whole way with the first margin was gone once.
+    assert [run.what for run in refined.runs].count("sparse 50% of the way, soft") == 1
 
 
 def test_a_short_rest_of_the_way_is_gone_in_one_step(start: WholeHand) -> None:
-    told = Told(lambda level, share: True)
+    told = Told(lambda level, share, margin: True)
     refined = told.lengthen(start, 0.96, Margin())
     assert told.shares("sparse") == pytest.approx([0.96, 1.0])
     assert refined.exact
@@ -209,13 +277,19 @@ def test_a_motion_that_is_exact_but_for_its_samples_takes_the_last_step_alone(
     start: WholeHand, answers: list[bool], exact: bool
 ) -> None:
     left = iter(answers)
-    told = Told(lambda level, share: next(left))
+    told = Told(lambda level, share, margin: next(left))
     assert told.renew(start, Margin()).exact == exact
     # Where a small barrier leads nowhere a larger one is tried.
     assert told.ways == len(answers) * [("fine", "exact")]
 
 
-def test_a_grip_is_made_firmer_on_sparse_knots_first(start: WholeHand) -> None:
-    told = Told(lambda level, share: True)
-    assert told.tighten(start, Margin(normal_force=2.0)).exact
+def test_a_grip_is_made_firmer_on_sparse_knots_first_and_on_the_tasks_own_where_few_do_not_serve(
+    start: WholeHand,
+) -> None:
+    firm = Margin(normal_force=2.0)
+    told = Told(lambda level, share, margin: margin == firm)
+    assert told.regrip(start, firm).exact
     assert told.ways == [("sparse", SHORT), ("coarse", "exact"), ("fine", "exact")]
+    told = Told(lambda level, share, margin: level == "fine" and margin == firm)
+    assert told.regrip(start, firm).exact
+    assert told.ways == [("sparse", SHORT), ("coarse", SHORT), ("fine", "exact")]

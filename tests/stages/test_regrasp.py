@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from casadi_hands.stages.floating import FloatingStage, solve_floating
+from casadi_hands.stages import floating as floating_stage
+from casadi_hands.stages.floating import BARRIERS, HELD_BACK, FloatingStage, solve_floating
 from casadi_hands.stages.grasp import passes_gate
 from casadi_hands.stages.model import Model, Regrasp, build_model
 from casadi_hands.stages.object_side import sampled_points, straight_path
 from casadi_hands.stages.regrasp import FARTHEST, held_back, planned_regrasp
 from casadi_hands.task import parse_task
+from tests.stages.example import made_up_solution
 
 Array = np.ndarray
 
@@ -99,6 +103,7 @@ def test_a_ball_that_two_fingers_cannot_hold_is_turned_with_contacts_held_back(m
     model, solved, solve = ball(), [], FloatingStage._solved
     monkeypatch.setattr(FloatingStage, "_solved", lambda self, *a: solved.append(self.model.regrasp) or solve(self, *a))
     floating = solve_floating(model, parse_task_weights())
+    assert floating.solution.status == "Solve_Succeeded"
     # Nothing is solved that would leave too few contacts.
     assert [plan.lifted.any() for plan in solved if plan is not None] == [False]
     assert floating.model.regrasp is not None
@@ -107,6 +112,23 @@ def test_a_ball_that_two_fingers_cannot_hold_is_turned_with_contacts_held_back(m
     seen = np.einsum("kij,kcj->kci", Rotation.from_rotvec(floating.pose[:, 3:]).as_matrix(), floating.point)
     np.testing.assert_allclose(np.linalg.norm(seen, axis=2), 1.0, atol=0.1)
     assert (seen * seen[:1]).sum(axis=2).min() > np.cos(FARTHEST)
+
+
+def test_contacts_held_back_are_solved_with_a_small_barrier_first_and_a_regrasp_with_the_usual_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    model, used = ball(), []
+    before: Any = SimpleNamespace(pose=straight_path(model), active=np.ones((7, 3), bool))
+    before.solution = made_up_solution({})
+    monkeypatch.setattr(FloatingStage, "_solved", lambda self, *given: used.append(given[-1]) or before.solution)
+    monkeypatch.setattr(floating_stage, "passes_gate", lambda *_, **__: False)
+    for lifted in (False, True):
+        plan = held_back(model, before.pose)
+        plan.lifted[3, 0] = lifted
+        assert FloatingStage(replace(model, regrasp=plan)).solve_regrasp(before, parse_task_weights()) is None
+    assert used == [HELD_BACK, BARRIERS]
+    assert HELD_BACK[0].mu_init < min(barrier.mu_init for barrier in BARRIERS)
+    assert HELD_BACK[1:] == BARRIERS
 
 
 def test_what_counts_is_the_way_seen_from_the_palm() -> None:

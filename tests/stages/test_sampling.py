@@ -52,6 +52,27 @@ def test_a_task_at_fewer_samples_has_the_same_palm_and_pushes_there() -> None:
     np.testing.assert_allclose(np.linalg.norm(fewer.palm_quaternion, axis=1), 1, atol=1e-12)
 
 
+def test_no_push_is_lost_between_knots_and_of_two_the_larger_is_kept() -> None:
+    _, model = everything()
+    samples = model.schedule.samples
+    push, twist = np.zeros((len(samples), 3)), np.zeros((len(samples), 3))
+    # Sample by sample one that no knot falls into, one at a knot, and two before the same next knot.
+    push[2], push[6], push[11], twist[12] = [0, 0, 1], [0, 2, 0], [3, 0, 0], [0, 0, 4]
+    pushed = replace(model, perturbation_force=push, perturbation_torque=twist)
+    knots = np.array([0, 1, 3, 6, 7, 9, 13])
+    schedule = replace(model.schedule, samples=samples[[*knots, *range(14, len(samples))]])
+    fewer = resampled_model(pushed, schedule)
+    wanted = {1: push[2], 3: push[6]}
+    for k in range(len(schedule.samples)):
+        np.testing.assert_array_equal(fewer.perturbation_force[k], wanted.get(k, np.zeros(3)), str(k))
+    np.testing.assert_array_equal(fewer.perturbation_torque[5], twist[12])
+    assert np.count_nonzero(fewer.perturbation_torque.any(axis=1)) == 1
+    # At its own samples the task stays what it is; in halved intervals a push lasts to its next sample.
+    np.testing.assert_array_equal(resampled_model(pushed, model.schedule).perturbation_force, push)
+    halved = resampled_model(pushed, model.schedule.halved(np.ones(len(samples) - 1, bool)))
+    np.testing.assert_array_equal(halved.perturbation_force, np.repeat(push, 2, axis=0)[:-1])
+
+
 def test_a_smooth_motion_comes_back_from_fewer_samples(start: WholeHand) -> None:
     _, model = everything()
     fewer = resampled_model(model, model.schedule.stepped(0.2))

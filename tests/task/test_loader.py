@@ -1,6 +1,10 @@
 from pathlib import Path
 
+import pytest
+
+from casadi_hands.errors import TaskError
 from casadi_hands.task import load_task, parse_task, task_to_yaml
+from casadi_hands.task.yamlfile import TaskFile
 
 TEXT = """\
 object: {mass: 0.1, shapes: [{sphere: {center: [0, 0, 0], radius: 0.03}}]}
@@ -15,6 +19,18 @@ def test_name_is_the_files(tmp_path: Path) -> None:
     assert load_task(tmp_path / "turn a ball.yaml").name == "turn a ball"
     (tmp_path / "named.yaml").write_text("name: my ball\n" + TEXT)
     assert load_task(str(tmp_path / "named.yaml")).name == "my ball"
+
+
+def test_a_text_that_was_read_before_is_read_as_before() -> None:
+    first = TaskFile(TEXT, "first")
+    first.data["palm"]["position"][2] = 5
+    again = TaskFile(TEXT, "again")
+    assert again.source == "again"
+    assert again.data["palm"]["position"] == [0, 0, 0.3]
+    assert again.line(("palm", "facing")) == first.line(("palm", "facing")) == 2
+    for source in ("one", "other"):
+        with pytest.raises(TaskError, match=f"^{source}:1: "):
+            TaskFile("- a list", source)
 
 
 def test_anchors() -> None:
