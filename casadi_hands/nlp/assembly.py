@@ -11,6 +11,7 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -119,75 +120,145 @@ def _nonzeros(matrix: SX) -> SX:
     return ca.densify(matrix.nz[:]) if matrix.nnz() else SX.zeros(0, 1)
 
 
+class Reads:
+    """What kernels read: z = (x, the other linear expressions of x that any of them reads, each once).
+
+    Kernels that read the same expressions share its entries, so that their derivatives are summed before they are
+    spread over the variables.
+
+    Attributes:
+        positions: for each selector, where in z its rows stand.
+        size: entries of z.
+    """
+
+    def __init__(self, selectors: Sequence[sparse.csr_array], variables: int) -> None:
+        """Find the distinct rows of selectors (rows, variables)."""
+        rows = sparse.csr_array(sparse.vstack([sparse.csr_array((0, variables)), *selectors], format="csr"))
+        rows.sum_duplicates()
+        rows.eliminate_zeros()
+        first, last = rows.indptr[:-1], rows.indptr[1:]
+        plain = last - first == 1
+        plain[plain] = rows.data[first[plain]] == 1
+        position = np.zeros(len(first), np.int64)
+        position[plain] = rows.indices[first[plain]]
+        seen: dict[tuple[bytes, bytes], int] = {}
+        others: list[int] = []
+        for row in np.flatnonzero(~plain).tolist():
+            entries = slice(first[row], last[row])
+            content = rows.indices[entries].tobytes(), rows.data[entries].tobytes()
+            if content not in seen:
+                seen[content] = variables + len(others)
+                others.append(row)
+            position[row] = seen[content]
+        self.positions: list[Indices] = np.split(position, np.cumsum([each.shape[0] for each in selectors])[:-1])
+        self.size = variables + len(others)
+        self._variables = variables
+        self._others = rows[others]
+        # All rows of z by the variables, where they are not just these.
+        self._rows = sparse.csr_array(sparse.vstack([sparse.eye_array(variables), self._others])) if others else None
+
+    def of(self, x: MX) -> MX:
+        """Z (size,) of the variables."""
+        return x if self._rows is None else ca.vertcat(x, ca.mtimes(MX(to_dm(self._others)), x))
+
+    def gradient(self, slopes: MX) -> MX:
+        """By the variables, from the gradient by z (size,)."""
+        return slopes if self._rows is None else ca.mtimes(MX(to_dm(self._rows.T)), slopes)
+
+    def jacobian(self, slopes: MX) -> MX:
+        """By the variables, from the Jacobian by z (m, size)."""
+        if self._rows is None or not slopes.nnz():
+            return slopes[:, : self._variables]
+        row, read = _places(slopes)
+        source, column, weight = _expand(self._rows, read)
+        return gather_nonzeros((slopes.size1(), self._variables), Places(row[source], column, source, weight), slopes)
+
+    def hessian(self, upper: MX) -> MX:
+        """The upper triangle by the variables, from the upper triangle by z (size, size)."""
+        if self._rows is None or not upper.nnz():
+            return upper[: self._variables, : self._variables]
+        left, right = _places(upper)
+        source, row, row_weight = _expand(self._rows, left)
+        owner, column, weight = _expand(self._rows, right[source])
+        row, weight, source = row[owner], row_weight[owner] * weight, source[owner]
+        # Off the diagonal an entry stands for two, which meet on the diagonal; on it, pairs come in both orders.
+        apart = (left != right)[source]
+        weight[apart & (row == column)] *= 2.0
+        kept = apart | (row <= column)
+        row, column = np.minimum(row, column)[kept], np.maximum(row, column)[kept]
+        shape = self._variables, self._variables
+        return gather_nonzeros(shape, Places(row, column, source[kept], weight[kept]), upper)
+
+
+def _places(matrix: MX) -> tuple[Indices, Indices]:
+    """Row and column of each nonzero."""
+    row, column = np.array(matrix.sparsity().get_triplet(), np.int64).reshape(2, -1)
+    return row, column
+
+
 def _expand(rows: sparse.csr_array, wanted: Indices) -> tuple[Indices, Indices, NDArray[np.float64]]:
     """All nonzeros of the wanted rows: position in ``wanted``, column, value."""
-    counts = rows.indptr[wanted + 1] - rows.indptr[wanted]
+    first = rows.indptr[wanted].astype(np.int64)
+    counts = rows.indptr[wanted + 1] - first
     owner = np.repeat(np.arange(len(wanted)), counts)
-    offset = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    position = rows.indptr[wanted][owner] + offset
+    position = np.arange(len(owner)) + np.repeat(first - np.cumsum(counts) + counts, counts)
     return owner, rows.indices[position].astype(np.int64), rows.data[position]
 
 
-def scatter_jacobian(
-    selector: sparse.csr_array, count: int, pattern: Sparsity, first_row: int
-) -> tuple[Indices, Indices, Indices, NDArray[np.float64]]:
-    """Where local Jacobian nonzeros go: (global row, global column, source, weight).
+class Places(NamedTuple):
+    """Where values go in a matrix: row and column of each, its place among the sources, and its weight."""
+
+    row: Indices
+    column: Indices
+    source: Indices
+    weight: NDArray[np.float64]
+
+
+def scatter_jacobian(position: Indices, count: int, pattern: Sparsity, first_row: int) -> Places:
+    """Where local Jacobian nonzeros go, instance after instance; columns are entries of z.
 
     Args:
-        selector: (count·n, nx) stacked S_k.
+        position: (count·n,) of the local variables in z.
         count: number of instances.
         pattern: sparsity (m, n) of one local Jacobian.
-        first_row: global row of the first constraint of the first instance.
+        first_row: row of the first constraint of the first instance.
     """
-    local_row, local_column = (np.array(v, dtype=np.int64) for v in pattern.get_triplet())
-    m, n = pattern.shape
-    instance = np.repeat(np.arange(count), len(local_row))
-    owner, column, weight = _expand(selector, instance * n + np.tile(local_column, count))
-    row = first_row + instance * m + np.tile(local_row, count)
-    return row[owner], column, owner, weight
+    local_row, local_column = np.array(pattern.get_triplet(), np.int64).reshape(2, -1)
+    row = first_row + np.arange(count)[:, None] * pattern.size1() + local_row
+    column = position.reshape(count, -1)[:, local_column]
+    return Places(row.reshape(-1), column.reshape(-1), np.arange(row.size), np.ones(row.size))
 
 
-def scatter_hessian(
-    selector: sparse.csr_array, count: int, pattern: Sparsity
-) -> tuple[Indices, Indices, Indices, NDArray[np.float64]]:
-    """Where local upper-triangular Hessian nonzeros go in the global upper triangle, as ``scatter_jacobian``."""
-    a, b = (np.array(v, dtype=np.int64) for v in pattern.get_triplet())
-    n = pattern.size1()
-    off_diagonal = a != b
-    source = np.concatenate([np.arange(len(a)), np.flatnonzero(off_diagonal)])
-    left = np.concatenate([a, b[off_diagonal]])
-    right = np.concatenate([b, a[off_diagonal]])
-    instance = np.repeat(np.arange(count), len(left))
-    sources = instance * len(a) + np.tile(source, count)
-    owner, row, row_weight = _expand(selector, instance * n + np.tile(left, count))
-    inner, column, column_weight = _expand(selector, (instance * n + np.tile(right, count))[owner])
-    row, weight, sources = row[inner], row_weight[inner] * column_weight, sources[owner][inner]
-    keep = row <= column
-    return row[keep], column[keep], sources[keep], weight[keep]
+def scatter_hessian(position: Indices, count: int, pattern: Sparsity) -> Places:
+    """Where local upper-triangular Hessian nonzeros go in the upper triangle by z, as ``scatter_jacobian``."""
+    a, b = np.array(pattern.get_triplet(), np.int64).reshape(2, -1)
+    local = position.reshape(count, -1)
+    left, right = local[:, a].reshape(-1), local[:, b].reshape(-1)
+    # Off a local diagonal an entry stands for two, which meet where both variables are the same.
+    weight = np.where((left == right) & np.tile(a != b, count), 2.0, 1.0)
+    return Places(np.minimum(left, right), np.maximum(left, right), np.arange(left.size), weight)
 
 
-def combined(matrix: sparse.csr_array, values: MX) -> MX:
-    """A constant matrix times a column; what only picks entries does no arithmetic."""
-    picks = np.all(np.diff(matrix.indptr) == 1) and np.all(matrix.data == 1)
-    # Of a single entry CasADi picks a row.
-    return ca.vec(values[matrix.indices.tolist()]) if picks else ca.mtimes(MX(to_dm(matrix)), values)
+def together(places: Sequence[Places]) -> Places:
+    """Places of values that stand one after the other."""
+    first = np.cumsum([0, *[len(each.source) for each in places]])
+    sources = [each.source + start for each, start in zip(places, first, strict=False)]
+    row, column, _, weight = (np.concatenate(part) for part in zip(*places, strict=True))
+    return Places(row, column, np.concatenate(sources), weight)
 
 
-def gather_nonzeros(
-    shape: tuple[int, int], parts: list[tuple[Indices, Indices, Indices, NDArray[np.float64]]], sources: list[MX]
-) -> MX:
-    """A sparse matrix whose nonzeros are fixed combinations of the entries of ``sources``, one for each part."""
-    if not parts or all(len(part[0]) == 0 for part in parts):
-        return MX(*shape)
-    rows, columns = (np.concatenate([part[i] for part in parts]) for i in range(2))
+def gather_nonzeros(shape: tuple[int, int], places: Places, values: MX) -> MX:
+    """A sparse matrix whose nonzeros are weighted sums of the nonzeros of ``values``."""
+    row, column, source, weight = places
     # The pattern as a matrix whose entries are where its nonzeros stand: many times faster than sorting all.
-    pattern = sparse.csc_array((np.ones(len(rows), np.int8), (rows, columns)), shape=shape)
+    pattern = sparse.csc_array((np.ones(len(row), np.int8), (row, column)), shape=shape)
     pattern.sort_indices()
     place = sparse.csc_array((np.arange(pattern.nnz), pattern.indices, pattern.indptr), shape=shape)
-    position = np.asarray(place[rows, columns]).reshape(-1)
-    first = np.cumsum([0, *[values.numel() for values in sources]])
-    source = np.concatenate([part[2] + start for part, start in zip(parts, first[:-1], strict=True)])
-    weight = np.concatenate([part[3] for part in parts])
-    mix = sparse.csr_array((weight, (position, source)), shape=(pattern.nnz, first[-1]))
+    position = np.asarray(place[row, column]).reshape(-1)
     sparsity = Sparsity(*shape, pattern.indptr.tolist(), pattern.indices.tolist())
-    return MX(sparsity, combined(mix, ca.vertcat(*sources)))
+    if len(row) == pattern.nnz and np.all(weight == 1):
+        order = np.empty(len(row), np.int64)
+        order[position] = source
+        return MX(sparsity, ca.vec(values.nz[order.tolist()]))
+    mix = sparse.csc_array((weight, (position, source)), shape=(pattern.nnz, values.nnz()))
+    return MX(sparsity, ca.mtimes(MX(to_dm(mix)), values.nz[:]))

@@ -14,11 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from casadi_hands.nlp.assembly import (
     KernelFunctions,
-    combined,
+    Places,
+    Reads,
     gather_nonzeros,
     kernel_functions,
     scatter_hessian,
     scatter_jacobian,
+    together,
 )
 from casadi_hands.nlp.kernel import Kernel
 from casadi_hands.nlp.layout import Layout, Rows
@@ -40,10 +42,14 @@ class _Bound:
 
 @dataclass(frozen=True)
 class _Mapped:
-    """A kernel's functions and what all its instances give them: local variables, parameters and weights, by column."""
+    """A kernel's functions, where its local variables stand among all that is read, and what its instances give them.
+
+    Local variables, parameters and weights have a column for each instance.
+    """
 
     bound: _Bound
     functions: KernelFunctions
+    position: NDArray[np.int64]
     variables: MX
     parameters: MX
     weights: MX
@@ -154,18 +160,23 @@ class Problem:
         x, p = MX.sym("x", self.variables.size), MX.sym("p", self.parameters.size)
         scale, multipliers = MX.sym("lam_f"), MX.sym("lam_g", self.constraints.size)
         kernels = kernel_functions([bound.kernel for bound in self._bound])
-        mapped = [_Mapped(b, k, *self._inputs(b, x, p)) for b, k in zip(self._bound, kernels, strict=True)]
+        reads = Reads([bound.selector for bound in self._bound], self.variables.size)
+        z = reads.of(x)
+        bindings = zip(self._bound, kernels, reads.positions, strict=True)
+        mapped = [_Mapped(b, k, position, *_inputs(b, z[position.tolist()], p)) for b, k, position in bindings]
         values = [each.call("value") for each in mapped]
         gradients = [each.call("gradient") for each in mapped]
         f = sum((ca.sum2(total) for total, _, _ in values), MX(0))
         g = self._stacked([each for _, _, each in values])
         gradient = MX.zeros(x.numel(), 1)
         if gradients:
-            spread = sparse.csr_array(sparse.vstack([bound.selector for bound in self._bound]).T)
-            gradient = combined(spread, ca.vertcat(*[ca.vec(slope) for _, slope in gradients]))
+            position = np.concatenate(reads.positions)
+            places = Places(position, np.zeros_like(position), np.arange(len(position)), np.ones(len(position)))
+            slopes = gather_nonzeros((reads.size, 1), places, ca.vertcat(*[ca.vec(slope) for _, slope in gradients]))
+            gradient = reads.gradient(ca.densify(slopes))
         # Each function's own: what it took from another would be computed twice.
         same_f = sum((ca.sum2(total) for total, _ in gradients), MX(0))
-        same_g, jacobian = self._jacobian(mapped)
+        same_g, jacobian = self._jacobian(reads, mapped)
         terms = self._term_values([v[1] for v in values], p)
         return {
             "nlp": Function("nlp", [x, p], [f, g], ["x", "p"], ["f", "g"]),
@@ -174,21 +185,12 @@ class Problem:
             "hess_lag": Function(
                 "nlp_hess_l",
                 [x, p, scale, multipliers],
-                [self._hessian(mapped, scale, multipliers)],
+                [self._hessian(reads, mapped, scale, multipliers)],
                 ["x", "p", "lam_f", "lam_g"],
                 ["triu_hess_gamma_x_x"],
             ),
             "terms": Function("terms", [x, p], [terms], ["x", "p"], ["terms"]),
         }
-
-    def _inputs(self, bound: _Bound, x: MX, p: MX) -> tuple[MX, MX, MX]:
-        local = ca.reshape(combined(bound.selector, x), -1, bound.count)
-        positions = bound.parameters.reshape(-1).tolist()
-        parameters = ca.reshape(p[positions], -1, bound.count) if positions else MX.zeros(0, bound.count)
-        weights = (
-            ca.repmat(p[bound.weights.tolist()], 1, bound.count) if bound.kernel.terms else MX.zeros(0, bound.count)
-        )
-        return local, parameters, weights
 
     def _term_values(self, values: list[MX], p: MX) -> MX:
         """Weighted total of each term, in the order of ``terms``."""
@@ -203,7 +205,7 @@ class Problem:
         """Constraints (rows of a kernel, instances) of all kernels in one column."""
         return ca.vertcat(*[ca.vec(g) for g in constraints if g.numel()]) if self.constraints.size else MX.zeros(0, 1)
 
-    def _jacobian(self, mapped: list[_Mapped]) -> tuple[MX, MX]:
+    def _jacobian(self, reads: Reads, mapped: list[_Mapped]) -> tuple[MX, MX]:
         """The constraints and their Jacobian."""
         constraints, parts, sources = [], [], []
         for each in mapped:
@@ -211,12 +213,11 @@ class Problem:
             g, nonzeros = each.call("jacobian")
             constraints.append(g)
             if pattern.nnz():
-                parts.append(scatter_jacobian(bound.selector, bound.count, pattern, bound.first_row))
+                parts.append(scatter_jacobian(each.position, bound.count, pattern, bound.first_row))
                 sources.append(ca.vec(nonzeros))
-        shape = self.constraints.size, self.variables.size
-        return self._stacked(constraints), gather_nonzeros(shape, parts, sources)
+        return self._stacked(constraints), reads.jacobian(_gathered((self.constraints.size, reads.size), parts, sources))
 
-    def _hessian(self, mapped: list[_Mapped], scale: MX, multipliers: MX) -> MX:
+    def _hessian(self, reads: Reads, mapped: list[_Mapped], scale: MX, multipliers: MX) -> MX:
         parts, sources = [], []
         for each in mapped:
             bound, pattern = each.bound, each.functions.hessian_pattern
@@ -225,9 +226,22 @@ class Problem:
                 local = multipliers[bound.first_row : bound.first_row + width * bound.count]
                 local = ca.reshape(local, width, bound.count) if width else MX.zeros(0, bound.count)
                 scales = ca.repmat(scale, 1, bound.count)
-                parts.append(scatter_hessian(bound.selector, bound.count, pattern))
+                parts.append(scatter_hessian(each.position, bound.count, pattern))
                 sources.append(ca.vec(each.call("hessian", scales, local)))
-        return gather_nonzeros((self.variables.size, self.variables.size), parts, sources)
+        return reads.hessian(_gathered((reads.size, reads.size), parts, sources))
+
+
+def _gathered(shape: tuple[int, int], places: list[Places], sources: list[MX]) -> MX:
+    """A sparse matrix of the entries of ``sources``, whose places ``places`` tell."""
+    return gather_nonzeros(shape, together(places), ca.vertcat(*sources)) if places else MX(*shape)
+
+
+def _inputs(bound: _Bound, read: MX, p: MX) -> tuple[MX, MX, MX]:
+    """Local variables, parameters and weights of all instances, by column, of what they read."""
+    positions = bound.parameters.reshape(-1).tolist()
+    parameters = ca.reshape(p[positions], -1, bound.count) if positions else MX.zeros(0, bound.count)
+    weights = ca.repmat(p[bound.weights.tolist()], 1, bound.count) if bound.kernel.terms else MX.zeros(0, bound.count)
+    return ca.reshape(ca.vec(read), -1, bound.count), parameters, weights
 
 
 def _check_shapes(
