@@ -13,6 +13,7 @@ from __future__ import annotations
 import sys
 import tempfile
 from argparse import BooleanOptionalAction
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -45,6 +46,7 @@ METHODS: dict[str, Method] = {
     "Opti, expanded": partial(opti, expand=True),
 }
 CONSTRAINED = "the same, cones as constraints too"
+STAGES = 3  # that are compared
 SAME = 1e-3  # relative difference below which objectives count as equal
 PEERS = (
     "task",
@@ -60,7 +62,7 @@ PEERS = (
     "times slower in all",
     "MB",
 )
-EVALUATED = ("task", "stage", *(f"{name}: ms, times its kernels in a loop" for name in FUNCTIONS))
+EVALUATED = ("task", "stage", *(f"{name}: ms, times its kernels in a loop" for name in FUNCTIONS), "all, as called")
 MEDIANS = ("stage", "optimiser", "times slower to its own objective", "times slower in all", "tasks")
 SPENT = ("task", "stage", "s", "solves", "iterations", *(f"{kind} %" for kind in KINDS), "Python and files %")
 
@@ -187,8 +189,8 @@ def compared(ended: Outcome[Run], reference: Run, limit: float, same_problem: bo
     slower = [slowness(theirs, our) for theirs, our in pairs]
     in_all = total(run) / total(reference)
     return [
-        f"{run.building:.2f}",
-        f"{sum(attempt.seconds for attempt in run.attempts):.2f}",
+        f"{run.building:.3f}",
+        f"{sum(attempt.seconds for attempt in run.attempts):.3f}",
         str(sum(attempt.iterations for attempt in run.attempts)),
         f"{np.median(relative):.4g}",
         f"{lower} / {len(pairs) - lower - higher} / {higher}",
@@ -200,7 +202,10 @@ def compared(ended: Outcome[Run], reference: Run, limit: float, same_problem: bo
 
 
 def medians(rows: Sequence[Sequence[str]]) -> list[list[str]]:
-    """Over the tasks, of each optimiser in each stage, from the rows of ``PEERS``; what never ended is not counted."""
+    """Over the tasks, of each optimiser in each stage, from the rows of ``PEERS``; what never ended is not counted.
+
+    At the end, of the times of all stages together.
+    """
     table = []
     for stage, name in dict.fromkeys((row[1], row[2]) for row in rows):
         same = [dict(zip(PEERS, row, strict=True)) for row in rows if (row[1], row[2]) == (stage, name)]
@@ -210,6 +215,14 @@ def medians(rows: Sequence[Sequence[str]]) -> list[list[str]]:
             values = [float(row[column]) for row in ended if row[column] != NOTHING]
             cells.append(f"{np.median(values):.3g}" if values else NOTHING)
         table.append([stage, name, *cells, str(len(ended))])
+    seconds: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
+    for row in (dict(zip(PEERS, cells, strict=True)) for cells in rows):
+        if row["times slower in all"] != NOTHING:
+            seconds[row["optimiser"]][row["task"]].append(float(row["building s"]) + float(row["solving s"]))
+    for name, spent in seconds.items():
+        whole = {task: sum(each) / sum(seconds[OURS][task]) for task, each in spent.items() if len(each) == STAGES}
+        if whole:
+            table.append(["all", name, NOTHING, f"{np.median(list(whole.values())):.3g}", str(len(whole))])
     return table
 
 
@@ -218,15 +231,17 @@ def evaluations(task_file: Path) -> list[list[str]]:
     outcome = isolated(evaluation, task_file, limit=3600)
     name = load_task(task_file).name
     if outcome.value is None:
-        return [[name, outcome.failure, *[NOTHING] * len(FUNCTIONS)]]
-    rows = []
+        return [[name, outcome.failure, *[NOTHING] * (len(EVALUATED) - 2)]]
+    rows, everything = [], np.zeros(2)
     for stage, seconds in outcome.value.items():
         cells = []
         for function in FUNCTIONS:
-            whole, loop = seconds.get(function, (0.0, 0.0))
+            whole, loop, _ = seconds.get(function, (0.0, 0.0, 0))
             cells.append(f"{1e3 * whole:.2f}, {whole / loop:.2f}" if loop else NOTHING)
-        rows.append([name, stage, *cells])
-    return rows
+        spent = sum(calls * np.array([whole, loop]) for whole, loop, calls in seconds.values())
+        everything += spent
+        rows.append([name, stage, *cells, f"{spent[0] / spent[1]:.2f}"])
+    return [*rows, [name, "all", *[NOTHING] * len(FUNCTIONS), f"{everything[0] / everything[1]:.2f}"]]
 
 
 def slowness(theirs: Attempt, our: Attempt) -> float:

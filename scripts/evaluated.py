@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,16 +21,18 @@ from casadi_hands.nlp.assembly import KernelFunctions, kernel_functions
 
 Vector = NDArray[np.float64]
 FUNCTIONS = {"value": "nlp", "gradient": "grad_f", "Jacobian": "jac_g", "Hessian": "hess_lag"}
+COUNTED = {"value": ("f", "g"), "gradient": ("grad_f",), "Jacobian": ("jac_g",), "Hessian": ("hess_l",)}
 REPEATS, CALLS = 7, 20
 
 
-def evaluation(task_file: Path) -> dict[str, dict[str, tuple[float, float]]]:
-    """Seconds of one evaluation: stage -> function -> (of the whole problem, of its kernels alone in a loop).
+def evaluation(task_file: Path) -> dict[str, dict[str, tuple[float, float, int]]]:
+    """Seconds of one evaluation: stage -> function -> (of the whole problem, of its kernels alone in a loop, calls).
 
     Each stage's largest problem, where its first solve started. The loop gets what kernels read, and what they return
-    is not put together.
+    is not put together. Calls are those of all the stage's solves.
     """
     largest: dict[str, tuple[Solver, Posed]] = {}
+    calls: dict[str, Counter[str]] = defaultdict(Counter)
     stage = ""
 
     def hear(news: Any) -> None:
@@ -41,6 +44,9 @@ def evaluation(task_file: Path) -> dict[str, dict[str, tuple[float, float]]]:
 
         def solved(solver: Solver, *given: Any, **named: Any) -> Any:
             solution = recorded(solver, *given, **named)
+            stats = solver.nlpsol(posed[-1].options).stats()
+            for function, names in COUNTED.items():
+                calls[stage][function] += sum(stats.get(f"n_call_nlp_{name}", 0) for name in names)
             size = solver.problem.variables.size
             if stage not in largest or size > largest[stage][0].problem.variables.size:
                 largest[stage] = solver, posed[-1]
@@ -48,10 +54,17 @@ def evaluation(task_file: Path) -> dict[str, dict[str, tuple[float, float]]]:
 
         with patch.object(Solver, "solve", solved):
             solve(load_task(task_file), seed=0, jobs=1, progress=hear)
-    return {name: _compared(solver, each.start, each.parameters) for name, (solver, each) in largest.items()}
+    return {
+        name: {
+            function: (*seconds, calls[name][function])
+            for function, seconds in _compared(solver, each.start, each.parameters).items()
+        }
+        for name, (solver, each) in largest.items()
+    }
 
 
 def _compared(solver: Solver, x: Vector, p: Vector) -> dict[str, tuple[float, float]]:
+    """Seconds of each function, and of its kernels alone."""
     problem = solver.problem
     multipliers = np.random.default_rng(0).normal(size=problem.constraints.size)
     with _optimised():

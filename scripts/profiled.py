@@ -13,13 +13,13 @@ from unittest.mock import patch
 
 from casadi_hands import load_task, solve
 from casadi_hands.nlp import Options, Solution, Solver
-from casadi_hands.pipeline import Progress, certify
+from casadi_hands.pipeline import Progress, certify, judge
 from casadi_hands.stages.floating import FloatingStage
 from casadi_hands.stages.refine import RefineStage
 from casadi_hands.stages.synthesis import SynthesisStage
 from casadi_hands.stages.whole_hand import WholeHandStage
 
-KINDS = ("building", "value", "gradient", "Jacobian", "Hessian", "rest of IPOPT", "replays")
+KINDS = ("building", "value", "gradient", "Jacobian", "Hessian", "rest of IPOPT", "replays", "audits")
 _CALLED = {"value": ("nlp_f", "nlp_g"), "gradient": ("nlp_grad_f",), "Jacobian": ("nlp_jac_g",)}
 _CALLED["Hessian"] = ("nlp_hess_l",)
 _REPLAYS = ("replay", "replay_many")
@@ -51,6 +51,7 @@ class Ledger:
         patches += [patch.object(Solver, "nlpsol", self._timed(Solver.nlpsol))]
         patches += [patch.object(Solver, "solve", self._booked(Solver.solve))]
         patches += [patch.object(certify, name, self._timed(getattr(certify, name), "replays")) for name in _REPLAYS]
+        patches += [patch.object(judge, "audit", self._timed(judge.audit, "audits"))]
         for each in patches:
             each.start()
         try:

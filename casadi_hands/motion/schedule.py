@@ -74,8 +74,9 @@ class Schedule:
 
     def between(self, count: int) -> NDArray[np.float64]:
         """Times of the keyframes with ``count`` more between each pair, s."""
-        parts = [np.linspace(a, b, count + 2)[:-1] for a, b in itertools.pairwise(self.keyframes)]
-        return np.append(np.concatenate(parts), self.keyframes[-1])
+        steps = np.diff(self.keyframes) / (count + 1)
+        times = self.keyframes[:-1, None] + np.arange(count + 1) * steps[:, None]
+        return np.append(times, self.keyframes[-1])
 
 
 def _samples(keyframes: Sequence[float], step: float) -> NDArray[np.float64]:

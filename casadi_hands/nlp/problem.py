@@ -215,7 +215,8 @@ class Problem:
             if pattern.nnz():
                 parts.append(scatter_jacobian(each.position, bound.count, pattern, bound.first_row))
                 sources.append(ca.vec(nonzeros))
-        return self._stacked(constraints), reads.jacobian(_gathered((self.constraints.size, reads.size), parts, sources))
+        slopes = _gathered((self.constraints.size, reads.size), parts, sources)
+        return self._stacked(constraints), reads.jacobian(slopes)
 
     def _hessian(self, reads: Reads, mapped: list[_Mapped], scale: MX, multipliers: MX) -> MX:
         parts, sources = [], []

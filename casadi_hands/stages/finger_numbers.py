@@ -22,13 +22,13 @@ def contact_kinematics(finger: FingerSeed, strings: NDArray[np.int64], link_radi
         link_radius: half extents.
     """
     function = finger_kinematics(finger.joints)
+    # The same code serves CasADi's numbers; only its annotations speak of symbols.
+    length, radius = ca.DM(finger.lengths[-1]), ca.DM(link_radius)
+    on_link = [tip_point(ca.DM(tip), length, radius)[0] for tip in finger.tips]  # type: ignore[arg-type]
+    base, axes = np.append(finger.base, 0), finger.axis_vectors.T
     points, jacobians = [], []
     for angles, string in zip(finger.angles, strings, strict=True):
-        # The same code serves CasADi's numbers; only its annotations speak of symbols.
-        tip, length, radius = ca.DM(finger.tips[string]), ca.DM(finger.lengths[-1]), ca.DM(link_radius)
-        on_link, _ = tip_point(tip, length, radius)  # type: ignore[arg-type]
-        base = np.append(finger.base, 0)
-        *_, point, jacobian = function(base, finger.axis_vectors.T, finger.lengths, angles, on_link)
+        *_, point, jacobian = function(base, axes, finger.lengths, angles, on_link[string])
         points.append(np.asarray(point).reshape(-1))
         jacobians.append(np.asarray(jacobian))
     return np.array(points), np.array(jacobians)

@@ -59,14 +59,12 @@ def least_squares_forces(model: Model, rotation: Array) -> Array:
 
 def friction_edges(normals: Array, friction: Array) -> Array:
     """(3, C·edges) unit-normal-force edges of the linearised friction cones, inscribed."""
-    columns = []
-    for normal, mu in zip(normals, friction, strict=True):
-        across = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-        across /= np.linalg.norm(across)
-        other = np.cross(normal, across)
-        for angle in np.linspace(0, 2 * np.pi, _EDGES, endpoint=False):
-            columns.append(normal + mu * (np.cos(angle) * across + np.sin(angle) * other))
-    return np.array(columns).T
+    across = np.cross(normals, np.eye(3)[np.argmin(np.abs(normals), axis=1)])
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    other = np.cross(normals, across)
+    angles = np.linspace(0, 2 * np.pi, _EDGES, endpoint=False)[:, None]
+    sideways = np.cos(angles) * across[:, None] + np.sin(angles) * other[:, None]
+    return (normals[:, None] + friction[:, None, None] * sideways).reshape(-1, 3).T
 
 
 def needed_wrenches(model: Model, pose: Array) -> Array:

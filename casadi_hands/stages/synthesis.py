@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import casadi as ca
 import numpy as np
@@ -195,7 +195,7 @@ class SynthesisStage:
 
     def _parameters(self, seeds: tuple[FingerSeed, ...]) -> dict[str, Array | float]:
         target = self.target
-        primitives, up, ground = target.scene(target.collision_times(BETWEEN))
+        primitives, up, ground = self._scene
         values: dict[str, Array | float] = {
             "link_radius": target.link_radius,
             "palm_radius": target.palm_radius,
@@ -217,6 +217,11 @@ class SynthesisStage:
                 idle = np.flatnonzero(~target.active[1:-1, contact]) + 1
                 values[f"idle_step{contact}"] = ((target.times[idle + 1] - target.times[idle - 1]) / 2)[:, None]
         return values
+
+    @cached_property
+    def _scene(self) -> tuple[Array, Array, Array]:
+        """What fingers must keep clear of, at the times of the clearance's samples."""
+        return self.target.scene(self.target.collision_times(BETWEEN))
 
     def _weights(self, weights: Mapping[str, object], step: int) -> dict[str, float]:
         samples = {"collision": len(self.target.collision_times(BETWEEN))}

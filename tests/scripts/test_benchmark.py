@@ -11,7 +11,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-from benchmark import MEDIANS, PEERS, SPENT, compared, medians, reached, shares, slowness
+from benchmark import MEDIANS, OURS, PEERS, SPENT, compared, medians, reached, shares, slowness
 from evaluated import _compared, _loops
 from growth import ITERATIONS, Size, exponent, measure, task_of
 from isolated import Outcome, isolated
@@ -46,8 +46,8 @@ def test_rows_of_optimisers() -> None:
     worse, better = attempt((0.0, 9.0), (1.0, 4.0)), attempt((0.0, 9.0), (3.0, 0.5))
     row = compared(Outcome(Run(2.0, [worse, better, OUR]), "", 99.6, 7.0), Run(0.4, [OUR] * 3), 3.0, True)
     named = dict(zip(PEERS[3:], row, strict=True))
-    assert named["building s"] == "2.00"
-    assert named["solving s"] == "4.20"
+    assert named["building s"] == "2.000"
+    assert named["solving s"] == "4.200"
     assert named["iterations"] == "4"
     assert named["objective / ours"] == "1"
     assert named["lower / equal / higher"] == "1 / 1 / 1"
@@ -61,12 +61,24 @@ def test_rows_of_optimisers() -> None:
 
 def test_medians_are_of_what_ended() -> None:
     ended = [
-        [task, "1", "BFGS", *["x"] * 6, own, in_all, "90"]
+        [task, "1", "BFGS", *["1"] * 6, own, in_all, "90"]
         for task, own, in_all in (("a", "3", "10"), ("b", "5", "40"), ("c", "9", "20"))
     ]
     other = ["a", "2", "BFGS", "stopped after 3 s", *["–"] * 8]
     assert medians([*ended, other]) == [["1", "BFGS", "5", "20", "3"], ["2", "BFGS", "–", "–", "0"]]
     assert len(MEDIANS) == 5
+
+
+def test_medians_of_all_stages_are_of_their_times_together() -> None:
+    def row(task: str, stage: str, name: str, building: str, solving: str) -> list[str]:
+        return [task, stage, name, building, solving, *["x"] * 4, "1", "1", "90"]
+
+    rows = [row(task, stage, OURS, "1", "0") for task in "abc" for stage in ("1", "2, finger", "2, hand")]
+    # 24 / 3, and only one stage of three.
+    rows += [row("a", stage, "Opti", "7", "1") for stage in ("1", "2, finger", "2, hand")]
+    rows += [row("b", "1", "Opti", "1", "1")]
+    together = [each for each in medians(rows) if each[0] == "all"]
+    assert together == [["all", OURS, "–", "1", "3"], ["all", "Opti", "–", "8", "1"]]
 
 
 def test_functions_and_loops_of_kernels_compute_the_same() -> None:
@@ -131,7 +143,7 @@ def test_the_ledger_books_each_second_once() -> None:
     solving = sum(solution.seconds for solution in solutions)
     assert booked.pop("building") > 0
     assert sum(booked.values()) == pytest.approx(solving, rel=1e-9)
-    assert all(0 < booked[kind] < solving for kind in KINDS[1:-1])  # no replays yet
+    assert all(0 < booked[kind] < solving for kind in KINDS[1:-2])  # no replays or audits yet
     assert ledger.iterations["floating"] == sum(solution.iterations for solution in solutions)
     assert ledger.solves["floating"] == len(solutions)
     FloatingStage(build_model(task))
