@@ -293,7 +293,9 @@ def refine(
 
 
 @pytest.mark.parametrize("share", [1.0, 0.5])
-@pytest.mark.parametrize(("drops", "kept"), [([4, 2], FIRM), ([4, 4], AMPLE), ([4, 5], AMPLE), ([1], AMPLE)])
+@pytest.mark.parametrize(
+    ("drops", "kept"), [([4, 2], FIRM), ([1, 0], FIRM), ([4, 4], AMPLE), ([4, 5], AMPLE), ([0], AMPLE)]
+)
 def test_a_firmer_grip_is_tried_where_replays_drop_and_kept_where_they_drop_less(
     monkeypatch: pytest.MonkeyPatch, share: float, drops: list[int], kept: Margin
 ) -> None:

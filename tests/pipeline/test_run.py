@@ -12,7 +12,7 @@ import pytest
 from casadi_hands.design import Design
 from casadi_hands.errors import DesignError, SolveError
 from casadi_hands.pipeline import Progress, run, solve
-from casadi_hands.pipeline.certify import DROPS, FIRM, REPLAYS, Refiner
+from casadi_hands.pipeline.certify import FIRM, REPLAYS, Refiner
 from casadi_hands.pipeline.record import Record
 from casadi_hands.task import parse_task
 from tests.pipeline.test_warm import HELD, earlier, edited, pressing
@@ -21,7 +21,7 @@ from tests.pipeline.test_warm import HELD, earlier, edited, pressing
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """An earlier result that kept a firm grip."""
-    earlier(motion=pressing(2.1, 0.4), status="certified").save(tmp_path / "earlier")
+    earlier(motion=pressing(4.1, 0.8), status="certified").save(tmp_path / "earlier")
     return tmp_path / "earlier"
 
 
@@ -49,7 +49,7 @@ def never(*_: Any) -> Design:
 def test_a_certified_refinement_of_the_earlier_hand_is_the_result(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    calls = refined_as(monkeypatch, "certified", DROPS)
+    calls = refined_as(monkeypatch, "certified", 1)
     monkeypatch.setattr(run, "_run", never)
     solve(parse_task(edited("[0.115, 0, 0.3] -> [0.115, 0.005, 0.3]")), jobs=1, out=tmp_path / "out", start=folder)
     (call,) = calls
@@ -67,7 +67,7 @@ def test_the_folder_that_is_written_may_be_the_start(folder: Path, monkeypatch: 
     solve(parse_task(edited("mass: 0.1 -> mass: 0.15")), jobs=1, out=folder, start=folder)
     motion = Design.load(folder).motion
     assert motion is not None
-    np.testing.assert_allclose(motion.contact_force, 1.5 * pressing(2.1, 0.4).contact_force, atol=1e-9)
+    np.testing.assert_allclose(motion.contact_force, 1.5 * pressing(4.1, 0.8).contact_force, atol=1e-9)
 
 
 @pytest.mark.parametrize(

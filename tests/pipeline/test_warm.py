@@ -206,7 +206,8 @@ def pressing(normal: float, across: float) -> Motion:
 @pytest.mark.parametrize(
     ("normal", "across", "status", "margin"),
     [
-        (2.1, 0.4, "certified", FIRM),
+        (4.1, 0.8, "certified", FIRM),
+        (3.0, 0.6, "certified", AMPLE),
         (1.5, 0.3, "certified", AMPLE),
         (1.5, 0.5, "certified", SMALL),  # two thirds of the friction
         (0.5, 0.1, "certified", SMALL),
