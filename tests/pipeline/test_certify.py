@@ -195,7 +195,7 @@ def test_what_a_firmer_grip_changes_is_told_from_the_hand_before_any_refinement(
     # Each solve is told with the margin that it kept, whatever was asked for at first.
     assert [run["what"].split("friction and ")[1] for run in record.design.stages] == [
         "1 weights of grip",
-        "2 weights of grip",
+        "4 weights of grip",
         "1 weights of grip",
     ]
 
