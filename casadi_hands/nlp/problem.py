@@ -98,6 +98,7 @@ class Problem:
         variables: Sequence[Rows],
         parameters: Sequence[NDArray[np.int64]] = (),
         bounds: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
+        name: str = "",
     ) -> None:
         """Evaluate a kernel once for each row of its arguments; with none, only its constraints' names are known.
 
@@ -106,6 +107,7 @@ class Problem:
             variables: for each local variable the rows (K, d) it reads.
             parameters: for each local parameter positions (K, d), or (1, d) where all instances share it.
             bounds: lower and upper bound of each constraint, broadcast to its length in every instance.
+            name: before the constraints' own names; by default the kernel's.
 
         Raises:
             ValueError: arguments that are not one for each of the kernel's symbols, or not of its size.
@@ -114,7 +116,7 @@ class Problem:
         _check_shapes(kernel.name, sizes, [(rows.count, rows.width) for rows in variables], (count,))
         _check_shapes(kernel.name, kernel.parameter_sizes, [p.shape for p in parameters], (count, 1))
         first = self.constraints.size
-        self._constrain(kernel, count, bounds or {})
+        self._constrain(name or kernel.name, kernel, count, bounds or {})
         if not count:
             return
         columns = self.variables.size
@@ -134,18 +136,20 @@ class Problem:
         weights = np.array([self.parameters[f"weight.{term}"][0] for term in terms], int)
         self._bound.append(_Bound(kernel, weights, selector, positions, count, first))
 
-    def _constrain(self, kernel: Kernel, count: int, bounds: Mapping[str, tuple[ArrayLike, ArrayLike]]) -> None:
+    def _constrain(
+        self, block: str, kernel: Kernel, count: int, bounds: Mapping[str, tuple[ArrayLike, ArrayLike]]
+    ) -> None:
         """Reserve the kernel's constraint rows, instance after instance, and set their bounds."""
         sizes = {name: g.numel() for name, g in kernel.constraints.items()}
         width = sum(sizes.values())
         if not width:
             return
-        rows = self.constraints.add(kernel.name, (count, width))
+        rows = self.constraints.add(block, (count, width))
         lower, upper = np.empty((count, width)), np.empty((count, width))
         start = 0
         for name, size in sizes.items():
             lower[:, start : start + size], upper[:, start : start + size] = bounds[name]
-            self.constraint_rows[f"{kernel.name}.{name}"] = rows[:, start : start + size]
+            self.constraint_rows[f"{block}.{name}"] = rows[:, start : start + size]
             start += size
         self.constraint_lower = np.append(self.constraint_lower, lower.reshape(-1))
         self.constraint_upper = np.append(self.constraint_upper, upper.reshape(-1))

@@ -84,13 +84,13 @@ class Scene:
 
 
 @cache
-def contact(joints: int, index: int, limited: bool) -> Kernel:
+def contact(joints: int, limited: bool) -> Kernel:
     """One touching contact at one knot: on both surfaces, normals opposed, in the cone, supplied by the joints.
 
     Constraints: ``on_object`` (1), ``on_link`` (3: surface and normal, see ``Touch``) and those of ``_hold``.
     The cost of friction is the fourth power of the share in use.
     """
-    kernel = Kernel(f"contact{index}")
+    kernel = Kernel("contact")
     symbols = free_morphology(kernel, joints)
     pose, point, force = kernel.variable("pose", 6), kernel.variable("point", 3), kernel.variable("force", 3)
     angles = kernel.variable("angles", joints)
@@ -109,9 +109,9 @@ def contact(joints: int, index: int, limited: bool) -> Kernel:
 
 
 @cache
-def held(joints: int, index: int, limited: bool) -> Kernel:
+def held(joints: int, limited: bool) -> Kernel:
     """A second force of a touching contact at one knot: in the cone, and supplied by the joints, as the first."""
-    kernel = Kernel(f"held{index}")
+    kernel = Kernel("held")
     symbols = free_morphology(kernel, joints)
     pose, point, angles = kernel.variable("pose", 6), kernel.variable("point", 3), kernel.variable("angles", joints)
     force = kernel.variable("force", 3)
@@ -140,9 +140,9 @@ def _hold(kernel: Kernel, touch: Touch, force: SX, friction: SX, limited: bool) 
 
 
 @cache
-def rolling(joints: int, index: int) -> Kernel:
+def rolling(joints: int) -> Kernel:
     """One contact from one knot to the next: its paths over both surfaces agree (no slip), and its spin costs."""
-    kernel = Kernel(f"rolling{index}")
+    kernel = Kernel("rolling")
     symbols = free_morphology(kernel, joints)
     poses, points, angles = [], [], []
     for i in range(2):
@@ -168,21 +168,16 @@ def rolling(joints: int, index: int) -> Kernel:
 
 
 @cache
-def apart(
-    joints: int, primitives: int, index: int, touched: int | None, grounded: bool, between: bool = False
-) -> Kernel:
+def apart(joints: int, primitives: int, touched: int | None, grounded: bool) -> Kernel:
     """One finger clear of palm, ground, itself and the object at one time.
 
     Args:
         joints: of the finger.
         primitives: of the object.
-        index: the contact.
         touched: the primitive the last link touches, left out; None where it must stay clear of all.
         grounded: whether there is a ground.
-        between: whether the time is between two knots; only names the kernel.
     """
-    kind = "apart_touching" if touched is not None else "apart_between" if between else "apart"
-    kernel = Kernel(f"{kind}{index}")
+    kernel = Kernel("apart")
     symbols = free_morphology(kernel, joints)
     pose, angles = kernel.variable("pose", 6), kernel.variable("angles", joints)
     reference, palm_position, palm_quaternion = (
@@ -212,9 +207,9 @@ def apart(
 
 
 @cache
-def fingers_apart(joints: int, other_joints: int, tag: str) -> Kernel:
+def fingers_apart(joints: int, other_joints: int) -> Kernel:
     """Two fingers clear of each other at one time."""
-    kernel = Kernel(f"fingers_apart{tag}")
+    kernel = Kernel("fingers_apart")
     first = free_morphology(kernel, joints, "_a")
     angles = kernel.variable("angles_a", joints)
     second = free_morphology(kernel, other_joints, "_b")
@@ -227,9 +222,9 @@ def fingers_apart(joints: int, other_joints: int, tag: str) -> Kernel:
 
 
 @cache
-def joint_motion(joints: int, index: int, limited: bool) -> Kernel:
+def joint_motion(joints: int, limited: bool) -> Kernel:
     """One finger's angles at three knots: smooth, and within the speed limit if there is one."""
-    kernel = Kernel(f"joint_motion{index}")
+    kernel = Kernel("joint_motion")
     angles = [kernel.variable(f"angles{i}", joints) for i in range(3)]
     steps = [kernel.parameter(f"step{i}") for i in range(2)]
     kernel.cost("joint_acceleration", derivative(angles, steps))
@@ -239,21 +234,21 @@ def joint_motion(joints: int, index: int, limited: bool) -> Kernel:
 
 
 @cache
-def joint_jerk(joints: int, index: int) -> Kernel:
+def joint_jerk(joints: int) -> Kernel:
     """How the acceleration of one finger's joints changes over four knots.
 
     Between knots joints move on smooth curves, which leave the paths that roll where accelerations change abruptly.
     """
-    kernel = Kernel(f"joint_jerk{index}")
+    kernel = Kernel("joint_jerk")
     angles = [kernel.variable(f"angles{i}", joints) for i in range(4)]
     kernel.cost("joint_jerk", derivative(angles, [kernel.parameter(f"step{i}") for i in range(3)]))
     return kernel
 
 
 @cache
-def stay(joints: int, index: int) -> Kernel:
+def stay(joints: int) -> Kernel:
     """A finger's morphology: short, on the palm, and near what the synthesis found."""
-    kernel = Kernel(f"stay{index}")
+    kernel = Kernel("stay")
     base, lengths, axes = (
         kernel.variable("base", 2),
         kernel.variable("lengths", joints),

@@ -162,10 +162,11 @@ class RefineProblem:
         rows: list[Rows],
         parameters: list[NDArray[np.int64]],
         bounds: Mapping[str, tuple[ArrayLike, ArrayLike]],
+        name: str = "",
     ) -> None:
         """Bind a block, and keep the knot that each of its instances is at, or begins at."""
-        self.problem.bind(kernel, rows, parameters, bounds)
-        self.knots_of[kernel.name] = knots
+        self.problem.bind(kernel, rows, parameters, bounds, name)
+        self.knots_of[name or kernel.name] = knots
 
     # The object.
 
@@ -254,21 +255,22 @@ class RefineProblem:
         parameters = [*frames, *self._scene(c, touching)]
         parameters += self._at(("friction", f"tie{c}", f"wanted_point{c}", f"wanted_force{c}"), touching)
         surfaces = {"on_object": (0.0, 0.0), "on_link": (0.0, 0.0)}
-        kernel = finger.contact(n, c, np.isfinite(torque))
+        kernel = finger.contact(n, np.isfinite(torque))
         variables = rows(touching, self.pose, point, self.force.entries(*span), angles)
-        self._bind(touching, kernel, variables, parameters, surfaces | held)
+        self._bind(touching, kernel, variables, parameters, surfaces | held, f"contact{c}")
         pushed = np.flatnonzero(structure.active[self.pushed, i])
         if len(pushed):
             knots = self.pushed[pushed]
             variables = [*rows(knots, self.pose, point, angles), self.push.take(pushed).entries(*span)]
             parameters = [*frames, *self._scene(c, knots), *self._at(("friction",))]
-            self._bind(knots, finger.held(n, c, np.isfinite(torque)), variables, parameters, held)
+            kernel = finger.held(n, np.isfinite(torque))
+            self._bind(knots, kernel, variables, parameters, held, f"held{c}")
         start = np.flatnonzero(structure.active[:-1, i])
         variables = rows(start, self.pose, point, angles)
         variables += [r.take(start + 1) for r in (self.pose, point, angles)]
         parameters = [*frames, *self._scene(c, start), *self._scene(c, start + 1)]
         parameters += self._at((f"helper{c}", "step"), start)
-        self._bind(start, finger.rolling(n, c), variables, parameters, {"no_slip": _FREE})
+        self._bind(start, finger.rolling(n), variables, parameters, {"no_slip": _FREE}, f"rolling{c}")
 
     def _bind_clearance(self, i: int) -> None:
         structure, model = self.structure, self.structure.model
@@ -285,18 +287,19 @@ class RefineProblem:
             "primitives",
         )
 
-        def bind(knots: NDArray[np.int64], rows: list[Rows], least: float, skipped: int | None, between: bool) -> None:
-            kernel = finger.apart(n, len(model.primitives), c, skipped, model.ground is not None, between)
-            rows = [*[r.constant(len(knots)) for r in self.shape[i]], *rows]
-            self._bind(knots, kernel, rows, self._at((f"frames{c}", *names), knots), {"clear": (least, np.inf)})
+        def bind(kind: str, knots: NDArray[np.int64], rows: list[Rows], least: float, skipped: int | None) -> None:
+            kernel = finger.apart(n, len(model.primitives), skipped, model.ground is not None)
+            rows, at = [*[r.constant(len(knots)) for r in self.shape[i]], *rows], (f"frames{c}", *names)
+            self._bind(knots, kernel, rows, self._at(at, knots), {"clear": (least, np.inf)}, f"{kind}{c}")
 
-        for knots, skipped in ((np.flatnonzero(touching), touched), (np.flatnonzero(~touching), None)):
+        for kind, where, skipped in (("apart_touching", touching, touched), ("apart", ~touching, None)):
+            knots = np.flatnonzero(where)
             if len(knots):
-                bind(knots, [self.pose.take(knots), self.angles[i].take(knots)], CLEARANCE, skipped, between=False)
+                bind(kind, knots, [self.pose.take(knots), self.angles[i].take(knots)], CLEARANCE, skipped)
         if len(idle):  # a lifted finger is quick, and must not cut through the object's edge between two knots
             halves = np.zeros((len(idle), self.knots))
             halves[np.arange(len(idle)), idle] = halves[np.arange(len(idle)), idle + 1] = 0.5
-            bind(idle, [self.pose.combine(halves), self.angles[i].combine(halves)], 0.0, None, between=True)
+            bind("apart_between", idle, [self.pose.combine(halves), self.angles[i].combine(halves)], 0.0, None)
 
     def _bind_shape(self, i: int) -> None:
         """A finger's morphology, and its joints' motion: mirrored at both ends, so that it starts and ends at rest."""
@@ -306,16 +309,15 @@ class RefineProblem:
         mirrored = np.where(inner < 0, 1, np.where(inner >= count, count - 2, inner))
         three = [self.angles[i].take(mirrored[offset : offset + count]) for offset in range(3)]
         steps = self._steps(*(np.clip(np.arange(count) - back, 0, count - 2) for back in (1, 0)))
-        self._bind(
-            np.arange(count), finger.joint_motion(n, c, np.isfinite(speed)), three, steps, {"speed": (-speed, speed)}
-        )
+        kernel, limits = finger.joint_motion(n, np.isfinite(speed)), {"speed": (-speed, speed)}
+        self._bind(np.arange(count), kernel, three, steps, limits, f"joint_motion{c}")
         switches = np.flatnonzero(np.diff(structure.active[:, i].astype(int))) + 1
         first = np.array([k for k in range(count - 3) if k + 1 not in switches and k + 2 not in switches], int)
         four = [self.angles[i].take(first + offset) for offset in range(4)]
-        problem.bind(finger.joint_jerk(n, c), four, self._steps(first, first + 1, first + 2))
+        problem.bind(finger.joint_jerk(n), four, self._steps(first, first + 1, first + 2))
         wanted = self._at((f"wanted_base{c}", f"wanted_lengths{c}", f"wanted_axes{c}"))
         reach = (model.palm_radius - model.link_radius) ** 2
-        problem.bind(finger.stay(n, c), self.shape[i], wanted, {"on_palm": (0, reach)})
+        problem.bind(finger.stay(n), self.shape[i], wanted, {"on_palm": (0, reach)}, f"stay{c}")
 
     def _bind_pair(self, i: int, j: int) -> None:
         structure = self.structure
@@ -323,9 +325,10 @@ class RefineProblem:
         rows: list[Rows] = []
         for k in (i, j):
             rows += [*[r.constant(self.knots) for r in self.shape[k]], self.angles[k]]
-        kernel = finger.fingers_apart(structure.joints[i], structure.joints[j], f"{c}_{d}")
+        kernel = finger.fingers_apart(structure.joints[i], structure.joints[j])
         parameters = self._at((f"frames{c}", f"frames{d}", "radius"))
-        self._bind(np.arange(self.knots), kernel, rows, parameters, {"clear": (CLEARANCE, np.inf)})
+        every = np.arange(self.knots)
+        self._bind(every, kernel, rows, parameters, {"clear": (CLEARANCE, np.inf)}, f"fingers_apart{c}_{d}")
 
 
 def pushed_knots(model: Model) -> NDArray[np.int64]:

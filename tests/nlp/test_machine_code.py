@@ -108,9 +108,9 @@ def suffixes(cache: Path) -> list[str]:
 def kernels() -> list[Kernel]:
     return [
         dynamics(2),
-        exact_fingers.contact(2, 0, True),
-        exact_fingers.rolling(1, 1),
-        exact_fingers.fingers_apart(1, 2, "a"),
+        exact_fingers.contact(2, True),
+        exact_fingers.rolling(1),
+        exact_fingers.fingers_apart(1, 2),
     ]
 
 

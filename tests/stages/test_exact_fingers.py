@@ -76,7 +76,7 @@ class Contact:
 def test_a_contact_s_numbers_are_those_of_numpy_and_pinocchio(joints: int, seed: int) -> None:
     case = Contact(joints, seed)
     finger, place, normal, force = case.finger, case.place, case.normal, case.force
-    found = numbers(exact_fingers.contact(joints, 0, limited=True), *case.contact)
+    found = numbers(exact_fingers.contact(joints, limited=True), *case.contact)
     chain, link = PinFinger(finger).chain(finger.angles[0])
     on_link = link.T @ (place.in_palm(case.point) - chain[-2])
     # Kinks of capsules are rounded by a thousandth of their length.
@@ -123,7 +123,7 @@ def test_surfaces_touch_where_normals_are_opposed(joints: int, share: float, out
     case.place.vector = (turn * case.place.reference.inv()).as_rotvec()
     touched = case.place.palm.apply(on_axis + case.radius * link_normal) + case.place.palm_position
     case.place.position = touched - turn.apply(case.point)
-    found = numbers(exact_fingers.contact(joints, 0, limited=True), *case.contact)
+    found = numbers(exact_fingers.contact(joints, limited=True), *case.contact)
     np.testing.assert_allclose(found["on_object"], 0, atol=1e-5)
     # From within the object, the link's axis is a diameter away from where it should be.
     off = found["on_link"]
@@ -133,25 +133,25 @@ def test_surfaces_touch_where_normals_are_opposed(joints: int, share: float, out
 @pytest.mark.parametrize("joints", [1, 2, 3])
 def test_a_second_force_is_held_as_the_first(joints: int) -> None:
     case = Contact(joints, 7)
-    first = numbers(exact_fingers.contact(joints, 0, limited=True), *case.contact)
-    second = numbers(exact_fingers.held(joints, 0, limited=True), *case.held)
+    first = numbers(exact_fingers.contact(joints, limited=True), *case.contact)
+    second = numbers(exact_fingers.held(joints, limited=True), *case.held)
     assert set(second) == {"pressing", "cone", "passive", "torque", "passive_force"}
     for name, value in second.items():
         np.testing.assert_allclose(value, first[name], rtol=1e-12, atol=1e-12)
     # Turned about the normal, the force is as well within the cone; doubled, four times as far from its edge.
     turn = Rotation.from_rotvec(1.1 * case.normal)
     case.force = 2 * turn.apply(case.force)
-    other = numbers(exact_fingers.held(joints, 0, limited=True), *case.held)
+    other = numbers(exact_fingers.held(joints, limited=True), *case.held)
     np.testing.assert_allclose(other["pressing"], 2 * second["pressing"], rtol=1e-3)
     np.testing.assert_allclose(other["cone"], 4 * second["cone"], rtol=1e-2)
 
 
 def test_torque_is_a_constraint_only_where_it_is_limited() -> None:
-    assert "torque" in exact_fingers.contact(2, 0, limited=True).constraints
-    assert "torque" not in exact_fingers.contact(2, 0, limited=False).constraints
-    assert "torque" not in exact_fingers.held(2, 0, limited=False).constraints
-    assert "speed" in exact_fingers.joint_motion(2, 0, limited=True).constraints
-    assert "speed" not in exact_fingers.joint_motion(2, 0, limited=False).constraints
+    assert "torque" in exact_fingers.contact(2, limited=True).constraints
+    assert "torque" not in exact_fingers.contact(2, limited=False).constraints
+    assert "torque" not in exact_fingers.held(2, limited=False).constraints
+    assert "speed" in exact_fingers.joint_motion(2, limited=True).constraints
+    assert "speed" not in exact_fingers.joint_motion(2, limited=False).constraints
 
 
 # Rolling.
@@ -172,7 +172,7 @@ Knot = tuple[Array, Rotation, Array, float]
 
 def rolls(before: Knot, after: Knot) -> dict[str, Array]:
     """The rolling block of a ball at (position, orientation, contact in the palm frame, finger's angle) twice."""
-    return numbers(exact_fingers.rolling(1, 0), *rolling_block(before, after))
+    return numbers(exact_fingers.rolling(1), *rolling_block(before, after))
 
 
 def rolling_block(before: Knot, after: Knot) -> Block:
@@ -268,7 +268,7 @@ def test_clearances_of_a_finger_are_those_of_coal(touched: int | None, grounded:
         rng = np.random.default_rng(seed)
         finger, place = random_finger(joints, rng), Place(rng)
         primitives = np.hstack([rng.normal(size=(2, 6)), [[0.2], [0.3]]])
-        kernel = exact_fingers.apart(joints, 2, 0, touched, grounded)
+        kernel = exact_fingers.apart(joints, 2, touched, grounded)
         found = numbers(kernel, *clearance_block(finger, place, primitives))["clear"]
         links = PinFinger(finger).links(finger.angles[0])
         expected = [palm_apart(links[0][1], PALM_RADIUS) - RADIUS]
@@ -292,7 +292,7 @@ def test_clearances_of_two_fingers_are_those_of_coal() -> None:
     for seed in range(5):
         rng = np.random.default_rng(seed)
         one, other = random_finger(2, rng), random_finger(3, rng)
-        found = numbers(exact_fingers.fingers_apart(2, 3, "0_1"), *pair_block(one, other))["clear"]
+        found = numbers(exact_fingers.fingers_apart(2, 3), *pair_block(one, other))["clear"]
         links = [PinFinger(f).links(f.angles[0]) for f in (one, other)]
         expected = [between(a, b, 0.2) for a, b in itertools.product(*links)]
         np.testing.assert_allclose(found, expected, atol=6e-3)
@@ -308,7 +308,7 @@ def test_smoothness_and_staying() -> None:
     steps = {f"step{i}": step for i, step in enumerate(np.diff(times))}
     curve = [np.polynomial.Polynomial.fit(times[:3], column, 2) for column in angles[:3].T]
     found = numbers(
-        exact_fingers.joint_motion(2, 0, limited=True),
+        exact_fingers.joint_motion(2, limited=True),
         {f"angles{i}": angles[i] for i in range(3)},
         {name: steps[name] for name in ("step0", "step1")},
     )
@@ -316,10 +316,10 @@ def test_smoothness_and_staying() -> None:
     np.testing.assert_allclose(found["speed"], speeds.ravel(), rtol=1e-12)
     np.testing.assert_allclose(found["joint_acceleration"], sum(c.deriv(2)(0.0) ** 2 for c in curve), rtol=1e-9)
     curve = [np.polynomial.Polynomial.fit(times, column, 3) for column in angles.T]
-    found = numbers(exact_fingers.joint_jerk(2, 0), {f"angles{i}": angles[i] for i in range(4)}, steps)
+    found = numbers(exact_fingers.joint_jerk(2), {f"angles{i}": angles[i] for i in range(4)}, steps)
     np.testing.assert_allclose(found["joint_jerk"], sum(c.deriv(3)(0.0) ** 2 for c in curve), rtol=1e-9)
     finger, other = random_finger(2, rng), random_finger(2, rng)
-    found = numbers(exact_fingers.stay(2, 0), shape(finger), shape(other))
+    found = numbers(exact_fingers.stay(2), shape(finger), shape(other))
     apart = [finger.base - other.base, finger.lengths - other.lengths, finger.axes - other.axes]
     np.testing.assert_allclose(found["stay_design"], sum((a**2).sum() for a in apart), rtol=1e-12)
     np.testing.assert_allclose(found["on_palm"], finger.base @ finger.base, rtol=1e-12)
@@ -335,16 +335,16 @@ def test_derivatives_agree_with_differences() -> None:
     primitives = np.hstack([rng.normal(size=(2, 6)), [[0.2], [0.3]]])
     angles = rng.normal(size=(3, 2))
     for kernel, (variables, parameters) in (
-        (exact_fingers.contact(2, 0, limited=True), case.contact),
-        (exact_fingers.held(2, 0, limited=True), case.held),
-        (exact_fingers.rolling(1, 0), rolling_block(before, after)),
-        (exact_fingers.apart(2, 2, 0, 1, grounded=True), clearance_block(one, place, primitives)),
-        (exact_fingers.fingers_apart(2, 3, "0_1"), pair_block(one, other)),
+        (exact_fingers.contact(2, limited=True), case.contact),
+        (exact_fingers.held(2, limited=True), case.held),
+        (exact_fingers.rolling(1), rolling_block(before, after)),
+        (exact_fingers.apart(2, 2, 1, grounded=True), clearance_block(one, place, primitives)),
+        (exact_fingers.fingers_apart(2, 3), pair_block(one, other)),
         (
-            exact_fingers.joint_motion(2, 0, limited=True),
+            exact_fingers.joint_motion(2, limited=True),
             ({f"angles{i}": angles[i] for i in range(3)}, {"step0": STEP, "step1": 0.7 * STEP}),
         ),
-        (exact_fingers.stay(2, 0), (shape(one), shape(random_finger(2, rng)))),
+        (exact_fingers.stay(2), (shape(one), shape(random_finger(2, rng)))),
     ):
         check_block(kernel, variables, parameters)
 
@@ -352,9 +352,9 @@ def test_derivatives_agree_with_differences() -> None:
 def test_derivatives_are_finite_where_nothing_moves_and_nothing_presses() -> None:
     # The object where its reference is, the finger straight up and on its seed axes, a contact with no force.
     knot = on_cap(0.3, 0.0)
-    check_block(exact_fingers.rolling(1, 0), *rolling_block(knot, knot), h=1e-6)
+    check_block(exact_fingers.rolling(1), *rolling_block(knot, knot), h=1e-6)
     case = Contact(2, 0)
     case.finger = replace(case.finger, axes=np.zeros((2, 2)), angles=np.zeros((1, 2)))
     case.place.vector, case.force = np.zeros(3), np.zeros(3)
-    check_block(exact_fingers.contact(2, 0, limited=True), *case.contact, h=1e-6)
-    check_block(exact_fingers.held(2, 0, limited=True), *case.held, h=1e-6)
+    check_block(exact_fingers.contact(2, limited=True), *case.contact, h=1e-6)
+    check_block(exact_fingers.held(2, limited=True), *case.held, h=1e-6)
