@@ -127,8 +127,9 @@ def _bind_scenario(problem: Problem, model: Model, side: ObjectSide, force: Rows
         span = (3 * i, 3 * i + 3)
         rows = [force.entries(*span), side.activity.entries(i, i + 1), side.point[1].entries(*span)]
         parameters = [capsules[i : i + 1], p["friction"], p["sharpness"], p["step"]]
-        named = soft_object.contact_forces(suffix, str(i))
-        problem.bind(named, [*rows, side.point[0].entries(*span)], parameters, {"in_cone": (0, np.inf)})
+        rows.append(side.point[0].entries(*span))
+        kernel, bounds = soft_object.contact_forces(suffix), {"in_cone": (0, np.inf)}
+        problem.bind(kernel, rows, parameters, bounds, f"contact{i}{suffix}")
     if model.ground is not None:
         i, span = contacts - 1, (3 * contacts - 3, 3 * contacts)
         rows = [side.pose[1], side.pose[0], side.point[1].entries(*span), force.entries(*span)]

@@ -82,12 +82,12 @@ def dynamics(contacts: int, suffix: str = "", regularise: bool = True) -> Kernel
 
 
 @cache
-def contact_forces(suffix: str = "", tag: str = "") -> Kernel:
+def contact_forces(suffix: str = "") -> Kernel:
     """One finger contact at one sample: eq. 2.7, 2.8, 2.10, 2.12 and the slip they miss.
 
     Friction is also a constraint: the exponential of eq. 2.8 alone lets forces out of the cone by 0.1 m·g.
     """
-    kernel = Kernel("contact" + tag + suffix)
+    kernel = Kernel("contact" + suffix)
     force, activity = kernel.variable("force", 3), kernel.variable("activity", 1)
     point, before = kernel.variable("point", 3), kernel.variable("point_before", 3)
     capsule, friction, sharpness, step = (
