@@ -98,12 +98,18 @@ class Rows:
     @classmethod
     def beside(cls, parts: Sequence[Rows]) -> Rows:
         """Rows whose entries are those of all parts, one after the other; all have the same count."""
-        count, starts = parts[0].count, np.cumsum([0, *[part.matrix.shape[0] for part in parts]])
-        rows = [
-            start + np.arange(count * p.width).reshape(count, p.width) for start, p in zip(starts, parts, strict=False)
-        ]
-        stacked = sparse.csr_array(sparse.vstack([part.matrix for part in parts], format="csr"))
-        return cls(stacked[np.hstack(rows).reshape(-1)], count, sum(part.width for part in parts))
+        matrices = [part.matrix for part in parts]
+        before = np.cumsum([0, *[matrix.nnz for matrix in matrices]])
+        lengths = np.hstack([np.diff(p.matrix.indptr).reshape(p.count, p.width) for p in parts]).reshape(-1)
+        starts = np.hstack(
+            [p.matrix.indptr[:-1].reshape(p.count, p.width) + n for p, n in zip(parts, before, strict=False)]
+        )
+        ends = np.cumsum(lengths)
+        source = np.arange(before[-1]) + np.repeat(starts.reshape(-1) - ends + lengths, lengths)
+        indices, data = (np.concatenate([getattr(m, name) for m in matrices])[source] for name in ("indices", "data"))
+        shape = len(lengths), max(matrix.shape[1] for matrix in matrices)
+        joined = sparse.csr_array((data, indices, np.append(0, ends)), shape=shape)
+        return cls(joined, parts[0].count, sum(part.width for part in parts))
 
     def constant(self, count: int) -> Rows:
         """One row repeated for ``count`` instances."""

@@ -119,14 +119,8 @@ class Problem:
         self._constrain(name or kernel.name, kernel, count, bounds or {})
         if not count:
             return
-        columns = self.variables.size
-        blocks = [sparse.csr_array(r.matrix.copy()) for r in variables]
-        for block in blocks:
-            block.resize((block.shape[0], columns))
-        width = sum(size for _, size in sizes)
-        order = np.argsort(_interleave([size for _, size in sizes], count), kind="stable")
-        selector = sparse.csr_array(sparse.vstack(blocks, format="csr")[order])
-        assert selector.shape[0] == width * count
+        selector = Rows.beside(variables).matrix
+        selector.resize((selector.shape[0], self.variables.size))
         parts = [np.broadcast_to(p, (count, p.shape[1])) for p in parameters]
         positions = np.hstack(parts) if parts else np.zeros((count, 0), int)
         terms = list(kernel.terms)
@@ -258,12 +252,3 @@ def _check_shapes(
     for (name, size), shape in zip(sizes, shapes, strict=True):
         if shape not in [(count, size) for count in counts]:
             raise ValueError(f"{kernel}.{name}: rows {shape}, expected ({counts[0]}, {size})")
-
-
-def _interleave(sizes: list[int], count: int) -> NDArray[np.int64]:
-    """Sort keys that bring stacked blocks (each count·size rows) into the order instance, block, entry."""
-    width, keys, start = sum(sizes), [], 0
-    for size in sizes:
-        keys.append((np.arange(count)[:, None] * width + start + np.arange(size)).reshape(-1))
-        start += size
-    return np.concatenate(keys)
