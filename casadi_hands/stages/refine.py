@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +33,7 @@ _MET = ("acceptable_constr_viol_tol", 1e-8)  # by default a solve may end far fr
 HARD = replace(FIRM_SOLVE, max_iter=300, tol=1e-4, acceptable_tol=1e-3, constr_viol_tol=1e-10, extra=(*_NEAR, _MET))
 # From an exact motion of the same margins: a larger barrier would first push it off every bound that it rests on.
 NEARBY = replace(HARD, max_iter=150, mu_init=1e-5)
+PROJECTION = replace(NEARBY, max_iter=60)
 ACCEPTED = 1e-7  # largest violation with which a refined motion is handed on
 HOPELESS = 0.1  # half extents of slip: where firm solves leave more, rolling is out of the structure's reach
 FALLING = 0.5  # of the soft solve's slip: where the firm one leaves more than hopeless, but less than this, it goes on
@@ -179,11 +181,49 @@ class RefineStage:
             bounds = always | exact if what == "exact" else always
             parameters |= self._weighted(weights)
             solution = self.solver.solve(values, parameters, options, lower, upper, bounds)
+            if what == "exact" and not solution.violation <= ACCEPTED:
+                solution = self._projected(solution, parameters, lower, upper, bounds)
             runs.append(Run(what, solution, margin))
             values, used = solution.values, weights
             if what != "exact":
                 slips = self._slips(solution)
         return replace(self._result(start, runs, slips or self._slips(solution), used), share=share)
+
+    def _projected(
+        self,
+        solution: Solution,
+        parameters: Mapping[str, ArrayLike],
+        lower: Mapping[str, ArrayLike],
+        upper: Mapping[str, ArrayLike],
+        bounds: Mapping[str, tuple[ArrayLike, ArrayLike]],
+    ) -> Solution:
+        """The motion nearest to a solution that meets all constraints, or the solution if none is found.
+
+        Good motions may be far from the best one for hundreds of iterations; a motion that meets the constraints is
+        near them, and found in a few.
+        """
+        solver, names = self._projector
+        near = {f"near.{name}": solution.values[name] for name in names}
+        weights: dict[str, ArrayLike] = {f"weight.{term}": 0.0 for term in solver.problem.terms}
+        anchored = {**parameters, **weights, "weight.anchor": 1.0, **near}
+        nearest = solver.solve(solution.values, anchored, PROJECTION, lower, upper, bounds)
+        if not nearest.violation <= ACCEPTED:
+            return solution
+        terms = self.solver.evaluate(nearest.values, parameters)
+        return replace(
+            nearest,
+            terms=terms,
+            objective=sum(terms.values()),
+            iterations=solution.iterations + nearest.iterations,
+            seconds=solution.seconds + nearest.seconds,
+        )
+
+    @cached_property
+    def _projector(self) -> tuple[Solver, list[str]]:
+        """The same problem with anchors, and the variables that they hold."""
+        built = RefineProblem(self.structure)
+        names = built.anchor()
+        return Solver(built.problem), names
 
     def costs(self, step: Step, start: WholeHand, margin: Margin) -> dict[str, float]:
         """The weighted terms of a motion, as a step weights them."""

@@ -25,6 +25,7 @@ from casadi_hands.stages.refine import (
     NEARBY,
     WEIGHTS,
     Refined,
+    RefineStage,
     Run,
     Worst,
 )
@@ -395,6 +396,31 @@ def test_an_exact_motion_stays_itself_by_the_short_way(solved: Solved) -> None:
     assert all(0 < slip < 4e-3 for slip in again.slips.values())
 
 
+def farther_to_the_side(solved: Solved) -> Model:
+    """The task with its second goal a little farther to the side."""
+    shift = [[0, 0, 0], [0, 0.05, 0], [0, 0, 0], [0, 0, 0]]
+    return replace(solved.model, goal_positions=np.add(solved.model.goal_positions, shift))
+
+
+def test_an_exact_solve_that_is_cut_short_ends_with_the_exact_motion_nearest_to_it(
+    solved: Solved, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model, before = farther_to_the_side(solved), solved.refined.hand
+    stage = RefineStage(model, before.contacts, (2,) * model.contacts, before.active)
+    last, weights, options = LONG_WAY[-1]
+    way = ((last, weights, replace(options, max_iter=1)),)
+    found = stage.take(way, before, Margin())
+    assert found.exact
+    solution = found.hand.solution
+    assert (solution.terms.keys(), solution.violation <= ACCEPTED) == (set(stage.problem.terms), True)
+    assert solution.objective == pytest.approx(sum(solution.terms.values()))
+    assert solution.objective == pytest.approx(sum(stage.costs(way[0], found.hand, Margin()).values()), rel=0.5)
+    # The second goal is 0.05 away, and nothing has to go farther.
+    assert np.abs(found.hand.position - before.position).max() < 0.06
+    monkeypatch.setattr(RefineStage, "_projected", lambda self, solution, *_: solution)
+    assert not stage.take(way, before, Margin()).met
+
+
 def test_where_the_short_way_leads_nowhere_the_long_one_is_taken(
     solved: Solved, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -402,11 +428,9 @@ def test_where_the_short_way_leads_nowhere_the_long_one_is_taken(
     vain = continuation.SHORT_WAY[0], (last, weights, replace(options, max_iter=1))
     monkeypatch.setattr(continuation, "SHORT_WAY", vain)
     monkeypatch.setattr(continuation, "SERVES", 0.0)
-    model, before = solved.model, solved.refined.hand
-    # The second goal a little farther to the side.
-    farther = replace(
-        model, goal_positions=np.add(model.goal_positions, [[0, 0, 0], [0, 0.05, 0], [0, 0, 0], [0, 0, 0]])
-    )
+    monkeypatch.setattr(RefineStage, "_projected", lambda self, solution, *_: solution)
+    before, farther = solved.refined.hand, farther_to_the_side(solved)
+    model = solved.model
     again = Continuation(farther, before.contacts, (2,) * model.contacts, before.active).solve(
         before, Margin(), near=True
     )
