@@ -64,7 +64,8 @@ def friction_edges(normals: Array, friction: Array) -> Array:
     other = np.cross(normals, across)
     angles = np.linspace(0, 2 * np.pi, _EDGES, endpoint=False)[:, None]
     sideways = np.cos(angles) * across[:, None] + np.sin(angles) * other[:, None]
-    return (normals[:, None] + friction[:, None, None] * sideways).reshape(-1, 3).T
+    edges: Array = (normals[:, None] + friction[:, None, None] * sideways).reshape(-1, 3).T
+    return edges
 
 
 def needed_wrenches(model: Model, pose: Array) -> Array:
