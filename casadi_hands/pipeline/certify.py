@@ -163,11 +163,13 @@ class Refiner:
         stage = Continuation(self.model, whole.contacts, tuple(f.joints for f in whole.fingers), whole.active)
         refined = self._refined(stage, whole, margin, near, share)
         judged, refined, stage = self._between(whole, refined, stage, short, planned)
-        if refined.exact and judged.status != "certified" and margin.normal_force < refined.margin.normal_force:
-            looser = self._regripped(whole, refined, stage, margin, f"again with a looser grip: {judged.reason}")
-            design, looser, halved = self._between(whole, looser, stage, short, planned)
+        if refined.exact and judged.status != "certified":
+            # Where joints barely push, fingers may fold over in an instant: other forces take them another way.
+            other, grip = (AMPLE, "looser") if refined.margin == FIRM else (FIRM, "firmer")
+            regripped = self._regripped(whole, refined, stage, other, f"again with a {grip} grip: {judged.reason}")
+            design, regripped, halved = self._between(whole, regripped, stage, short, planned)
             if design.status == "certified":
-                judged, refined, stage = design, looser, halved
+                judged, refined, stage = design, regripped, halved
         drops = self._drops(judged)
         if drops and refined.margin != FIRM:
             text = f"again with a firmer grip: {drops} of {REPLAYS} replays dropped the object"

@@ -235,6 +235,7 @@ def test_what_is_missed_only_between_samples_gets_more_of_them(
         return SimpleNamespace(figures={**kept, missed: Figure(missed, parts.sum(), 1.0, "m", "", by_interval=parts)})
 
     monkeypatch.setattr(certify, "Continuation", Once)
+    monkeypatch.setattr(Refiner, "_regripped", lambda *_: SimpleNamespace(exact=False))  # no grip is any better
     monkeypatch.setattr(certify, "resampled", lambda hand, before, after: hand)
     monkeypatch.setattr(Refiner, "_attempt", lambda self, whole, margin, way: way(margin=margin))
     monkeypatch.setattr(Refiner, "_judged", judged)
@@ -326,6 +327,16 @@ def test_where_the_audit_refuses_a_firm_grip_over_a_long_way_the_looser_one_is_j
     margin, _ = refine(monkeypatch, ways, 0.5, statuses, drops)
     assert margin == kept
     assert ways.asked[:2] == [("lengthen", FIRM), ("regrip", AMPLE)]
+
+
+@pytest.mark.parametrize(("second", "kept"), [("certified", FIRM), ("feasible", AMPLE)])
+def test_where_the_audit_refuses_an_exact_motion_a_firmer_grip_is_judged(
+    monkeypatch: pytest.MonkeyPatch, second: str, kept: Margin
+) -> None:
+    ways = Ways(firm=False)
+    drops = [0] if second == "certified" else []
+    assert refine(monkeypatch, ways, 1.0, ["feasible", second], drops) == (kept, 0)
+    assert ways.asked == [("solve", AMPLE), ("regrip", FIRM)]
 
 
 def test_intervals_that_use_up_a_limit_and_their_neighbours_are_halved() -> None:
