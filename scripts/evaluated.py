@@ -14,6 +14,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 from peers import Posed, recorded_solves
+from profiled import CALLED
 
 from casadi_hands import load_task, solve
 from casadi_hands.nlp import Problem, Solver, assembly, machine_code
@@ -21,7 +22,6 @@ from casadi_hands.nlp.assembly import KernelFunctions, kernel_functions
 
 Vector = NDArray[np.float64]
 FUNCTIONS = {"value": "nlp", "gradient": "grad_f", "Jacobian": "jac_g", "Hessian": "hess_lag"}
-COUNTED = {"value": ("f", "g"), "gradient": ("grad_f",), "Jacobian": ("jac_g",), "Hessian": ("hess_l",)}
 REPEATS, CALLS = 7, 20
 
 
@@ -45,8 +45,8 @@ def evaluation(task_file: Path) -> dict[str, dict[str, tuple[float, float, int]]
         def solved(solver: Solver, *given: Any, **named: Any) -> Any:
             solution = recorded(solver, *given, **named)
             stats = solver.nlpsol(posed[-1].options).stats()
-            for function, names in COUNTED.items():
-                calls[stage][function] += sum(stats.get(f"n_call_nlp_{name}", 0) for name in names)
+            for function, names in CALLED.items():
+                calls[stage][function] += sum(stats.get(f"n_call_{name}", 0) for name in names)
             size = solver.problem.variables.size
             if stage not in largest or size > largest[stage][0].problem.variables.size:
                 largest[stage] = solver, posed[-1]

@@ -20,8 +20,8 @@ from casadi_hands.stages.synthesis import SynthesisStage
 from casadi_hands.stages.whole_hand import WholeHandStage
 
 KINDS = ("building", "value", "gradient", "Jacobian", "Hessian", "rest of IPOPT", "replays", "audits")
-_CALLED = {"value": ("nlp_f", "nlp_g"), "gradient": ("nlp_grad_f",), "Jacobian": ("nlp_jac_g",)}
-_CALLED["Hessian"] = ("nlp_hess_l",)
+CALLED = {"value": ("nlp_f", "nlp_g"), "gradient": ("nlp_grad_f",), "Jacobian": ("nlp_jac_g",)}
+CALLED["Hessian"] = ("nlp_hess_l",)
 _REPLAYS = ("replay", "replay_many")
 Seconds = dict[str, dict[str, float]]
 
@@ -81,7 +81,7 @@ class Ledger:
             record = solver.nlpsol(options or Options()).stats()
             booked = self.seconds[self.stage]
             left = solution.seconds
-            for kind, names in _CALLED.items():
+            for kind, names in CALLED.items():
                 seconds = sum(record[f"t_wall_{name}"] for name in names)
                 booked[kind] += seconds
                 left -= seconds

@@ -1,8 +1,9 @@
 """Partially separable assembly: each kernel's exact derivatives, mapped over its instances and scattered.
 
 With x_k = S_k x the local variables of instance k, the gradient is the sum of S_kᵀ g_k and the Hessian the sum
-of S_kᵀ H_k S_k. S_k is constant, so each global nonzero is a fixed linear combination of local nonzeros: one
-sparse matrix-vector product.
+of S_kᵀ H_k S_k. S_k is constant and many of its rows stand in several: z has each once, with S_k x a selection of z and
+z = Z x. What all instances add to z is summed first; each nonzero by x is then a fixed linear combination of those by
+z: one sparse matrix-vector product.
 """
 
 from __future__ import annotations
@@ -158,7 +159,7 @@ class Reads:
         self._rows = sparse.csr_array(sparse.vstack([sparse.eye_array(variables), self._others])) if others else None
 
     def of(self, x: MX) -> MX:
-        """Z (size,) of the variables."""
+        """All that is read (size,), of the variables (nx,)."""
         return x if self._rows is None else ca.vertcat(x, ca.mtimes(MX(to_dm(self._others)), x))
 
     def gradient(self, slopes: MX) -> MX:
@@ -169,7 +170,7 @@ class Reads:
         """By the variables, from the Jacobian by z (m, size)."""
         if self._rows is None or not slopes.nnz():
             return slopes[:, : self._variables]
-        row, read = _places(slopes)
+        row, read = _places(slopes.sparsity())
         source, column, weight = _expand(self._rows, read)
         return gather_nonzeros((slopes.size1(), self._variables), Places(row[source], column, source, weight), slopes)
 
@@ -177,7 +178,7 @@ class Reads:
         """The upper triangle by the variables, from the upper triangle by z (size, size)."""
         if self._rows is None or not upper.nnz():
             return upper[: self._variables, : self._variables]
-        left, right = _places(upper)
+        left, right = _places(upper.sparsity())
         source, row, row_weight = _expand(self._rows, left)
         owner, column, weight = _expand(self._rows, right[source])
         row, weight, source = row[owner], row_weight[owner] * weight, source[owner]
@@ -190,9 +191,9 @@ class Reads:
         return gather_nonzeros(shape, Places(row, column, source[kept], weight[kept]), upper)
 
 
-def _places(matrix: MX) -> tuple[Indices, Indices]:
+def _places(pattern: Sparsity) -> tuple[Indices, Indices]:
     """Row and column of each nonzero."""
-    row, column = np.array(matrix.sparsity().get_triplet(), np.int64).reshape(2, -1)
+    row, column = np.array(pattern.get_triplet(), np.int64).reshape(2, -1)
     return row, column
 
 
@@ -223,7 +224,7 @@ def scatter_jacobian(position: Indices, count: int, pattern: Sparsity, first_row
         pattern: sparsity (m, n) of one local Jacobian.
         first_row: row of the first constraint of the first instance.
     """
-    local_row, local_column = np.array(pattern.get_triplet(), np.int64).reshape(2, -1)
+    local_row, local_column = _places(pattern)
     row = first_row + np.arange(count)[:, None] * pattern.size1() + local_row
     column = position.reshape(count, -1)[:, local_column]
     return Places(row.reshape(-1), column.reshape(-1), np.arange(row.size), np.ones(row.size))
@@ -231,7 +232,7 @@ def scatter_jacobian(position: Indices, count: int, pattern: Sparsity, first_row
 
 def scatter_hessian(position: Indices, count: int, pattern: Sparsity) -> Places:
     """Where local upper-triangular Hessian nonzeros go in the upper triangle by z, as ``scatter_jacobian``."""
-    a, b = np.array(pattern.get_triplet(), np.int64).reshape(2, -1)
+    a, b = _places(pattern)
     local = position.reshape(count, -1)
     left, right = local[:, a].reshape(-1), local[:, b].reshape(-1)
     # Off a local diagonal an entry stands for two, which meet where both variables are the same.

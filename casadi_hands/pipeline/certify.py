@@ -147,7 +147,10 @@ class Refiner:
         near: bool = False,
         share: float = 1.0,
     ) -> tuple[Design, Refined, int]:
-        """Refine one hand with a margin, with a small one where that fails, with more where a replay drops.
+        """Refine one hand with a margin, and with others where that fails.
+
+        A small one where no motion is exact, another grip where the audit refuses one that is, a firm one where a
+        replay drops.
 
         Args:
             whole: the hand and its motion.

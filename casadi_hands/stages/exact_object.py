@@ -287,11 +287,3 @@ def tool_point() -> Kernel:
     kernel.constrain("on_path", off)
     kernel.cost("goal", off)
     return kernel
-
-
-@cache
-def anchor(share: float) -> Kernel:
-    """One variable, near to where a projection begins; with a larger share the same change costs more."""
-    kernel = Kernel("anchor")
-    kernel.cost("anchor", share * (kernel.variable("value", 1) - kernel.parameter("where")))
-    return kernel

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from casadi_hands.nlp import Options, Solution, Solver
 from casadi_hands.stages.model import Model
+from casadi_hands.stages.projection import Projector
 from casadi_hands.stages.refine_problem import RefineProblem, Structure
 from casadi_hands.stages.refine_values import Margin, RefineValues
 from casadi_hands.stages.sampling import shortened
@@ -197,16 +198,10 @@ class RefineStage:
         upper: Mapping[str, ArrayLike],
         bounds: Mapping[str, tuple[ArrayLike, ArrayLike]],
     ) -> Solution:
-        """The motion nearest to a solution that meets all constraints, or the solution if none is found.
-
-        Good motions may be far from the best one for hundreds of iterations; a motion that meets the constraints is
-        near them, and found in a few.
-        """
-        solver, names = self._projector
-        near = {f"near.{name}": solution.values[name] for name in names}
-        weights: dict[str, ArrayLike] = {f"weight.{term}": 0.0 for term in solver.problem.terms}
-        anchored = {**parameters, **weights, "weight.anchor": 1.0, **near}
-        nearest = solver.solve(solution.values, anchored, PROJECTION, lower, upper, bounds)
+        """The motion nearest to a solution that meets all constraints, or the solution if none is found."""
+        if not np.isfinite(solution.violation):
+            return solution
+        nearest = self._projector.nearest(solution, parameters, lower, upper, bounds)
         if not nearest.violation <= ACCEPTED:
             return solution
         terms = self.solver.evaluate(nearest.values, parameters)
@@ -219,11 +214,8 @@ class RefineStage:
         )
 
     @cached_property
-    def _projector(self) -> tuple[Solver, list[str]]:
-        """The same problem with anchors, and the variables that they hold."""
-        built = RefineProblem(self.structure)
-        names = built.anchor()
-        return Solver(built.problem), names
+    def _projector(self) -> Projector:
+        return Projector(RefineProblem(self.structure).problem, PROJECTION)
 
     def costs(self, step: Step, start: WholeHand, margin: Margin) -> dict[str, float]:
         """The weighted terms of a motion, as a step weights them."""

@@ -16,7 +16,6 @@ from casadi_hands.stages.object_side import CLEARANCE, GOAL_TOLERANCE, MOST_FORC
 from casadi_hands.stages.synthesis import AXIS_RANGE
 
 JOINT_MARGIN = 0.005  # rad, so that a smooth curve through the knots stays within the limits between them
-ANCHORED_FORCE = 0.1  # half extents that are as far to go as a force of one weight, in a projection
 _FREE = (-np.inf, np.inf)
 _HELD = {"pressing": (0.0, np.inf), "cone": (0.0, np.inf)}
 
@@ -330,22 +329,6 @@ class RefineProblem:
         parameters = self._at((f"frames{c}", f"frames{d}", "radius"))
         every = np.arange(self.knots)
         self._bind(every, kernel, rows, parameters, {"clear": (CLEARANCE, np.inf)}, f"fingers_apart{c}_{d}")
-
-    def anchor(self) -> list[str]:
-        """Let all variables but those that follow from them cost what they change from parameters ``near.<name>``.
-
-        Returns:
-            their names.
-        """
-        problem = self.problem
-        names = [name for name in problem.variables.names() if name not in ("rate", "wrench", "middle_torque")]
-        for name in names:
-            indices = problem.variables[name]
-            where = problem.parameter(f"near.{name}", indices.shape)
-            share = ANCHORED_FORCE if name.startswith("force") else 1.0
-            row = Rows.of(indices.reshape(-1, 1), problem.variables.size)
-            problem.bind(body.anchor(share), [row], [where.reshape(-1, 1)])
-        return names
 
 
 def pushed_knots(model: Model) -> NDArray[np.int64]:

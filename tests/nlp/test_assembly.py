@@ -41,6 +41,14 @@ def only_bounds() -> Kernel:
     return kernel
 
 
+def cross() -> Kernel:
+    """Two variables that may read the same."""
+    kernel = Kernel("cross")
+    a, b = kernel.variable("a", 2), kernel.variable("b", 2)
+    kernel.cost("cross", ca.sin(a[0]) * b[0] + a[1] ** 2 * b[1] + a[0] * b[1], "sum")
+    return kernel
+
+
 class Example:
     """The same program twice: assembled, and written out instance by instance for CasADi to differentiate."""
 
@@ -54,6 +62,9 @@ class Example:
         self.bindings: list[tuple[Kernel, list[np.ndarray], list[np.ndarray]]] = []
         self._bind(spring(), [first.combine(self.mixing[0]), second.combine(self.mixing[1])], [own, shared])
         self._bind(pull(), [second.take([0, 2, 2, 1])], [])
+        # The same expressions as another kernel's, twice; and the same variables.
+        self._bind(cross(), 2 * [first.combine(self.mixing[0])], [])
+        self._bind(cross(), 2 * [first], [])
         self._bind(only_bounds(), [first.combine(np.abs(self.mixing[0]))], [])
 
     def _bind(self, kernel: Kernel, rows: list[Rows], parameters: list[np.ndarray]) -> None:
@@ -131,7 +142,7 @@ def test_gradient_agrees_with_finite_differences(example: Example, at) -> None:
 def test_terms_by_name_sum_to_the_objective_and_shared_names_add_up(example: Example, at) -> None:
     problem = example.problem
     terms = np.asarray(problem.functions()["terms"](*at)).ravel()
-    assert problem.terms == ["stretch", "bump", "far"]
+    assert problem.terms == ["stretch", "bump", "far", "cross"]
     assert terms.sum() == pytest.approx(float(problem.functions()["nlp"](*at)[0]), rel=1e-12)
     # ``stretch`` of both kernels by hand.
     x, p = problem.variables.unpack(at[0]), problem.parameters.unpack(at[1])
