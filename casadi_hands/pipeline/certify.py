@@ -42,7 +42,7 @@ LONG_DROPS = 6  # likewise, where refining another takes minutes
 OUT_OF_REACH = 0.3  # half extents that a finger misses its contact by: nothing is left to refine
 SURELY = np.pi / 2  # that an object may turn so that contacts can surely go with it
 # What an exact motion misses only by how it goes between its samples; then it gets more of them.
-BETWEEN = {"residual_between", "gap_between", "slip", "penetration", "joint_limit"}
+BETWEEN = {"residual", "residual_between", "gap_between", "slip", "penetration", "joint_limit"}
 FINEST = 0.02  # s between samples
 ENOUGH = 0.7  # of a limit: intervals that contribute more are halved
 LEFT = 1 / 8  # of what an interval slips, once it is halved; a cubic spline's error falls to a sixteenth

@@ -63,7 +63,8 @@ def residual_figures(folder: Folder, shots: Shots) -> list[Figure]:
     kind, values = max((("force", force), ("torque", torque)), key=lambda item: float(np.max(item[1])))
     k = int(np.argmax(values))
     words = f"a {kind} of {{value}} that nothing exerts moves the object at {time[k + 1]:.3g} s"
-    at = Figure("residual", float(values[k]), limits.residual, "weight", words)
+    around = np.maximum(np.append(values, 0.0), np.append(0.0, values))  # in both intervals that meet at a sample
+    at = Figure("residual", float(values[k]), limits.residual, "weight", words, by_interval=around)
     between = between_residual(folder)
     k = int(np.argmax(between))
     words = (

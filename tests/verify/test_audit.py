@@ -123,6 +123,17 @@ def test_tampering_is_named(
     assert any(words in reason for reason in found.reasons), found.reasons
 
 
+def test_what_moves_the_object_at_a_sample_is_of_the_intervals_that_meet_there(good: Scene, tmp_path: Path) -> None:
+    force = good.motion.contact_force.copy()
+    force[4] *= 1.001
+    residual = audit(good.moved(contact_force=force).write(tmp_path / "bad")).figures["residual"]
+    assert residual.by_interval is not None
+    assert residual.by_interval.shape == (len(force) - 1,)
+    assert residual.by_interval.max() == residual.by_interval[3] == residual.by_interval[4] == residual.value
+    far = np.delete(residual.by_interval, [2, 3, 4, 5])
+    assert far.max() < 1e-3 * residual.value
+
+
 def test_goals_moved_in_the_task_are_missed(good: Scene, tmp_path: Path) -> None:
     found = audit(_goal_text(good, tmp_path).write(tmp_path / "bad"))
     assert found.figures["goal_position"].value == pytest.approx(1e-3, rel=1e-6)
