@@ -102,8 +102,7 @@ class Continuation:
             start: the motion.
             margin: to keep to the limits.
         """
-        ways = partial(self._on_few, SHORT_WAY, start, margin), partial(self.fine.take, LAST, start, margin)
-        return _until_met(ways)
+        return self._on_few(SHORT_WAY, start, margin)
 
     def lengthen(self, start: WholeHand, share: float, margin: Margin, firmer: Margin | None = None) -> Refined:
         """Refine a motion over a share of the way to its goals, and lengthen it until it reaches them.

@@ -283,13 +283,8 @@ def test_a_motion_that_is_exact_but_for_its_samples_takes_the_last_step_alone(
     assert told.ways == len(answers) * [("fine", "exact")]
 
 
-def test_a_grip_is_made_firmer_on_sparse_knots_first_and_on_the_tasks_own_where_few_do_not_serve(
-    start: WholeHand,
-) -> None:
+def test_a_grip_is_made_firmer_on_few_knots_first(start: WholeHand) -> None:
     firm = Margin(normal_force=2.0)
     told = Told(lambda level, share, margin: margin == firm)
     assert told.regrip(start, firm).exact
     assert told.ways == [("sparse", SHORT), ("coarse", "exact"), ("fine", "exact")]
-    told = Told(lambda level, share, margin: level == "fine" and margin == firm)
-    assert told.regrip(start, firm).exact
-    assert told.ways == [("sparse", SHORT), ("coarse", SHORT), ("fine", "exact")]
