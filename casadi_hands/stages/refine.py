@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from casadi_hands.nlp import Options, Solution, Solver
 from casadi_hands.stages.model import Model
-from casadi_hands.stages.projection import Projector
 from casadi_hands.stages.refine_problem import RefineProblem, Structure
 from casadi_hands.stages.refine_values import Margin, RefineValues
 from casadi_hands.stages.sampling import shortened
@@ -30,11 +28,27 @@ _MOST = 1e7  # of a multiplier; a regular one was seen to reach a tenth of that
 # large one first wanders to the middle of all bounds and back; too small ones crawl along every bound they meet.
 SOFT = Options(150, tol=1e-3, acceptable_tol=1e-2, mu_init=1e-3, most_multiplier=_MOST, extra=_NEAR)
 FIRM_SOLVE = replace(SOFT, constr_viol_tol=1e-6, mu_init=1e-4)
-_MET = ("acceptable_constr_viol_tol", 1e-8)  # by default a solve may end far from its constraints
-HARD = replace(FIRM_SOLVE, max_iter=300, tol=1e-4, acceptable_tol=1e-3, constr_viol_tol=1e-10, extra=(*_NEAR, _MET))
+_MET = 1e-8  # largest violation with which a solve may end before it is optimal, where it must be exact
+HARD = replace(
+    FIRM_SOLVE,
+    max_iter=300,
+    tol=1e-4,
+    acceptable_tol=1e-3,
+    constr_viol_tol=1e-10,
+    extra=(*_NEAR, ("acceptable_constr_viol_tol", _MET)),
+)
 # From an exact motion of the same margins: a larger barrier would first push it off every bound that it rests on.
-NEARBY = replace(HARD, max_iter=150, mu_init=1e-5)
-PROJECTION = replace(NEARBY, max_iter=60)
+# Nor is the best of all motions asked for: one that is good and nearly exact has an exact one very near it.
+_LOOSE = (("dual_inf_tol", 1e3), ("compl_inf_tol", 1e-3))
+NEARBY = replace(
+    FIRM_SOLVE,
+    mu_init=1e-5,
+    tol=0.3,
+    acceptable_tol=0.3,
+    constr_viol_tol=1e-4,
+    extra=(*_NEAR, *_LOOSE),
+)
+PROJECTION = replace(HARD, max_iter=60, mu_init=1e-5)
 ACCEPTED = 1e-7  # largest violation with which a refined motion is handed on
 HOPELESS = 0.1  # half extents of slip: where firm solves leave more, rolling is out of the structure's reach
 FALLING = 0.5  # of the soft solve's slip: where the firm one leaves more than hopeless, but less than this, it goes on
@@ -54,6 +68,7 @@ WEIGHTS = {
     "stay_path": 1.0,
     "goal": 300.0,
     "force_regularisation": 1e-3,
+    "anchor": 0.0,  # but in projections
 }
 FIRM = {"slip": 100.0, "passive_force": 30.0}
 FIRMER = FIRM | {"slip": 1000.0}
@@ -182,7 +197,7 @@ class RefineStage:
             bounds = always | exact if what == "exact" else always
             parameters |= self._weighted(weights)
             solution = self.solver.solve(values, parameters, options, lower, upper, bounds)
-            if what == "exact" and not solution.violation <= ACCEPTED:
+            if what == "exact" and not solution.violation <= _MET:
                 solution = self._projected(solution, parameters, lower, upper, bounds)
             runs.append(Run(what, solution, margin))
             values, used = solution.values, weights
@@ -201,8 +216,9 @@ class RefineStage:
         """The motion nearest to a solution that meets all constraints, or the solution if none is found."""
         if not np.isfinite(solution.violation):
             return solution
-        nearest = self._projector.nearest(solution, parameters, lower, upper, bounds)
-        if not nearest.violation <= ACCEPTED:
+        anchored = {**parameters, **self.built.anchors.at(solution.values)}
+        nearest = self.solver.solve(solution.values, anchored, PROJECTION, lower, upper, bounds)
+        if not nearest.violation < solution.violation:
             return solution
         terms = self.solver.evaluate(nearest.values, parameters)
         return replace(
@@ -212,10 +228,6 @@ class RefineStage:
             iterations=solution.iterations + nearest.iterations,
             seconds=solution.seconds + nearest.seconds,
         )
-
-    @cached_property
-    def _projector(self) -> Projector:
-        return Projector(RefineProblem(self.structure).problem, PROJECTION)
 
     def costs(self, step: Step, start: WholeHand, margin: Margin) -> dict[str, float]:
         """The weighted terms of a motion, as a step weights them."""

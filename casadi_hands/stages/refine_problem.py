@@ -13,6 +13,7 @@ from casadi_hands.stages import exact_fingers as finger
 from casadi_hands.stages import exact_object as body
 from casadi_hands.stages.model import Model
 from casadi_hands.stages.object_side import CLEARANCE, GOAL_TOLERANCE, MOST_FORCE
+from casadi_hands.stages.projection import Anchors
 from casadi_hands.stages.synthesis import AXIS_RANGE
 
 JOINT_MARGIN = 0.005  # rad, so that a smooth curve through the knots stays within the limits between them
@@ -71,6 +72,7 @@ class RefineProblem:
         problem: its variables, parameters and blocks.
         knots: their number.
         pushed: those at which the task's perturbations act.
+        anchors: of a projection.
         knots_of: for each block with constraints the knot of each of its instances; none where a block has no time.
     """
 
@@ -93,6 +95,7 @@ class RefineProblem:
             self._bind_shape(i)
             for j in range(i):
                 self._bind_pair(i, j)
+        self.anchors = Anchors(self.problem)
 
     # Variables and parameters.
 
@@ -136,6 +139,8 @@ class RefineProblem:
         problem.parameter("step", (count - 1, 1))
         for name, width in (("palm_position", 3), ("palm_quaternion", 4), ("wanted_pose", 6)):
             problem.parameter(name, (count, width))
+        for name, width in (("palm_position_between", 3), ("palm_quaternion_between", 4)):
+            problem.parameter(name, (count - 1, width))
         for c in structure.columns:
             problem.parameter(f"capsule{c}", (1, 7))
             for name in ("wanted_point", "wanted_force"):
@@ -167,6 +172,12 @@ class RefineProblem:
         """Bind a block, and keep the knot that each of its instances is at, or begins at."""
         self.problem.bind(kernel, rows, parameters, bounds, name)
         self.knots_of[name or kernel.name] = knots
+
+    def _halves(self, knots: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Weights (K, knots) that give the middle between each of some knots and the next one."""
+        weights = np.zeros((len(knots), self.knots))
+        weights[np.arange(len(knots)), knots] = weights[np.arange(len(knots)), knots + 1] = 0.5
+        return weights
 
     # The object.
 
@@ -271,6 +282,14 @@ class RefineProblem:
         parameters = [*frames, *self._scene(c, start), *self._scene(c, start + 1)]
         parameters += self._at((f"helper{c}", "step"), start)
         self._bind(start, finger.rolling(n), variables, parameters, {"no_slip": _FREE}, f"rolling{c}")
+        # Else a finger may be stretched out between knots, or folded, and find itself there on more of them.
+        halves = self._halves(start)
+        variables = [r.constant(len(start)) for r in shape]
+        variables += [r.combine(halves) for r in (self.pose, point, angles, self.force.entries(*span))]
+        palm = ("palm_position_between", "palm_quaternion_between")
+        parameters = [*frames, *self._at(("reference", *palm, f"capsule{c}", "radius", "friction"), start)]
+        kernel = finger.held(n, np.isfinite(torque))
+        self._bind(start, kernel, variables, parameters, dict.fromkeys(held, _FREE), f"between{c}")
 
     def _bind_clearance(self, i: int) -> None:
         structure, model = self.structure, self.structure.model
@@ -297,8 +316,7 @@ class RefineProblem:
             if len(knots):
                 bind(kind, knots, [self.pose.take(knots), self.angles[i].take(knots)], CLEARANCE, skipped)
         if len(idle):  # a lifted finger is quick, and must not cut through the object's edge between two knots
-            halves = np.zeros((len(idle), self.knots))
-            halves[np.arange(len(idle)), idle] = halves[np.arange(len(idle)), idle + 1] = 0.5
+            halves = self._halves(idle)
             bind("apart_between", idle, [self.pose.combine(halves), self.angles[i].combine(halves)], 0.0, None)
 
     def _bind_shape(self, i: int) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from casadi_hands.geometry import nearest_on_axis
+from casadi_hands.motion import continuous
 from casadi_hands.stages.model import Model
 from casadi_hands.stages.object_side import MOST_FORCE, MOST_TURN, tool_path
 from casadi_hands.stages.refine_problem import RefineProblem
@@ -18,6 +19,7 @@ Array = NDArray[np.float64]
 EASED = 0.5  # s over which a contact that touches or lifts comes to press with its full force, or to let go
 TOOL_TOLERANCE = 5e-3  # half extents, how far a drawing's tool may leave its path between goals
 SLIDING_TIE = 0.3  # of a contact to where it was planned to slide; it shall roll if it can
+ROUGHLY = 10.0  # times of what no joint may supply at knots may be so between them, where motions are interpolated
 Bounds = dict[str, tuple[ArrayLike, ArrayLike]]
 
 
@@ -45,7 +47,7 @@ class RefineValues:
     """
 
     def __init__(self, built: RefineProblem, model: Model) -> None:
-        self.structure, self.model = built.structure, model
+        self.structure, self.model, self.anchors = built.structure, model, built.anchors
         self.problem, self.pushed, self.knots = built.problem, built.pushed, built.knots
         # A contact that touches anew bears nothing until it does: its force grows from zero.
         self._active = active = self.structure.active
@@ -67,9 +69,9 @@ class RefineValues:
             exact[f"contact{c}.on_link"] = (-model.gap_tolerance, model.gap_tolerance)
             slip = self._slip_allowed(i)
             exact[f"rolling{c}.no_slip"] = (-slip, slip)
-            for kernel in ("contact", "held"):
+            for kernel, factor in (("contact", 1.0), ("held", 1.0), ("between", ROUGHLY)):
                 if f"{kernel}{c}.passive" in self.problem.constraint_rows:
-                    exact[f"{kernel}{c}.passive"] = (-margin.passive, margin.passive)
+                    exact[f"{kernel}{c}.passive"] = (-factor * margin.passive, factor * margin.passive)
         if structure.grounded:
             slip = self._slip_allowed(-1)
             exact["ground_rolling.no_slip"] = (-slip, slip)
@@ -132,6 +134,8 @@ class RefineValues:
     def parameters(self, motion: WholeHand, margin: Margin, wanted: WholeHand | None = None) -> dict[str, ArrayLike]:
         """Values of all parameters but the weights; costs hold a motion near to the wanted one, by default itself."""
         model, wanted = self.model, wanted or motion
+        quaternion = continuous(motion.palm_quaternion)
+        middle = quaternion[1:] + quaternion[:-1]
         values: dict[str, ArrayLike] = {
             "reference": model.reference,
             "gravity": model.gravity,
@@ -146,8 +150,11 @@ class RefineValues:
             "step": np.diff(model.schedule.samples)[:, None],
             "palm_position": motion.palm_position,
             "palm_quaternion": motion.palm_quaternion,
+            "palm_position_between": (motion.palm_position[1:] + motion.palm_position[:-1]) / 2,
+            "palm_quaternion_between": middle / np.linalg.norm(middle, axis=1, keepdims=True),
             "wanted_pose": np.hstack([wanted.position, wanted.vector]),
         }
+        values |= self.anchors.idle
         if len(self.pushed):
             values["push_force"] = model.perturbation_force[self.pushed]
             values["push_torque"] = model.perturbation_torque[self.pushed]

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation, Slerp
 
+from casadi_hands.stages import exact_fingers
 from casadi_hands.stages.object_side import tool_path
 from casadi_hands.stages.refine import WEIGHTS
 from casadi_hands.stages.refine_problem import Structure
-from tests.stages.blocks import surface
+from tests.stages.blocks import frames, numbers, surface
 from tests.stages.example import check_derivatives, doubling_each_weight, drawing, everything
 from tests.stages.refining import MadeUp, carrying, sketching
 
@@ -143,6 +145,32 @@ def test_the_ground_is_where_it_is_while_it_bears_load(loaded: MadeUp) -> None:
     np.testing.assert_allclose(found["ground_held.pressing"].ravel(), expected, atol=1e-12)
 
 
+def test_forces_are_supplied_in_the_middle_between_knots_too(loaded: MadeUp) -> None:
+    model, values, found = loaded.model, loaded.values, loaded.constraints(WEIGHTS)
+    palms = Rotation.from_quat(model.palm_quaternion, scalar_first=True)
+    turning = Slerp(np.arange(len(palms)), palms)
+    for i, c in enumerate((0, 2)):
+        finger = loaded.start.fingers[i]
+        intervals = np.flatnonzero(loaded.active[:-1, c])
+        assert len(found[f"between{c}.passive"]) == len(intervals)
+        for row, k in zip(found[f"between{c}.passive"], intervals, strict=True):
+            moving = (values["pose"], loaded.points[:, i], values[f"angles{c}"], loaded.forces[:, i])
+            middles = [(array[k] + array[k + 1]) / 2 for array in moving]
+            variables = {name: values[f"{name}{c}"] for name in ("base", "lengths", "axes")}
+            parameters = {
+                "frames": frames(finger),
+                "reference": model.reference,
+                "palm_position": (model.palm_position[k] + model.palm_position[k + 1]) / 2,
+                "palm_quaternion": turning(k + 0.5).as_quat(scalar_first=True),
+                "capsule": model.capsules[c],
+                "radius": model.link_radius,
+                "friction": 0.5 * model.friction,
+            }
+            variables |= dict(zip(("pose", "point", "angles", "force"), middles, strict=True))
+            expected = numbers(exact_fingers.held(finger.joints, limited=False), variables, parameters)
+            np.testing.assert_allclose(row, expected["passive"], atol=1e-12)
+
+
 def test_contacts_that_touch_only_at_the_end_do_not_roll() -> None:
     # An object that is put down at the last sample, where a finger reaches it, too.
     _, model = everything()
@@ -173,7 +201,7 @@ def test_goals_cost_what_the_object_is_off_them(loaded: MadeUp) -> None:
 
 
 def test_every_weight_moves_its_own_term(case: MadeUp) -> None:
-    weights = {name: WEIGHTS[name] for name in case.stage.problem.terms}
+    weights = {name: WEIGHTS[name] or 1.0 for name in case.stage.problem.terms}  # anchors weigh in projections only
     # Second forces are there for pushes alone.
     assert set(WEIGHTS) - set(weights) == ({"force_regularisation"} if case.model.tool is not None else set())
     evaluate = case.stage.solver.evaluate
