@@ -208,7 +208,7 @@ class Refiner:
     def _regripped(self, whole: WholeHand, refined: Refined, stage: Continuation, margin: Margin, why: str) -> Refined:
         """An exact motion refined with another margin."""
         with self.record.stage("refine", why):
-            return self._attempt(whole, margin, partial(stage.regrip, refined.hand))
+            return self._attempt(whole, margin, partial(stage.regrip, refined))
 
     def _refined(self, stage: Continuation, whole: WholeHand, margin: Margin, near: bool, share: float) -> Refined:
         """The refinement with this margin or, where that is not exact and another may be, with a small one.

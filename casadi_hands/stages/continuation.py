@@ -95,14 +95,14 @@ class Continuation:
         """
         return _until_met(partial(self.fine.take, way, start, margin) for way in (RENEWED, LAST))
 
-    def regrip(self, start: WholeHand, margin: Margin) -> Refined:
+    def regrip(self, exact: Refined, margin: Margin) -> Refined:
         """Refine a motion that is exact with another margin.
 
         Args:
-            start: the motion.
+            exact: the motion, at the task's samples.
             margin: to keep to the limits.
         """
-        return self._on_few(SHORT_WAY, start, margin)
+        return self._on_few(SHORT_WAY, self._gripped(exact, margin), margin)
 
     def lengthen(self, start: WholeHand, share: float, margin: Margin, firmer: Margin | None = None) -> Refined:
         """Refine a motion over a share of the way to its goals, and lengthen it until it reaches them.
@@ -118,12 +118,18 @@ class Continuation:
         """
         stage, found = self._found(partial(self._lengthened, start, share, margin))
         if firmer is not None and found.exact:
-            tight = self._named(stage, stage.take(SHORT_WAY, found.hand, firmer))
+            tight = self._named(stage, stage.take(SHORT_WAY, self._gripped(found, firmer), firmer))
             tight = _after("firmer grip,", self._denser(stage, tight, start, firmer))
             found = replace(found, runs=found.runs + tight.runs)
             if tight.exact:
                 return replace(tight, runs=found.runs)
         return self._denser(stage, found, start, margin)
+
+    def _gripped(self, exact: Refined, margin: Margin) -> WholeHand:
+        """A motion with its fingers' forces as much larger as another margin asks for: a start that presses enough."""
+        force = exact.hand.force.copy()
+        force[:, list(self.contacts)] *= max(1.0, margin.normal_force / exact.margin.normal_force)
+        return replace(exact.hand, force=force)
 
     def _on_few(self, way: tuple[Step, ...], start: WholeHand, margin: Margin) -> Refined:
         """A motion solved on few knots and made exact at the task's samples, near the same motion all the while."""

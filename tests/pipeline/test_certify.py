@@ -272,7 +272,7 @@ class Ways:
         assert (share, margin, firmer) == (0.5, AMPLE, FIRM)
         return self.taken("lengthen", firmer if self.firm else margin)
 
-    def regrip(self, start: Any, margin: Margin) -> Any:
+    def regrip(self, exact: Any, margin: Margin) -> Any:
         return self.taken("regrip", margin)
 
 

@@ -283,8 +283,16 @@ def test_a_motion_that_is_exact_but_for_its_samples_takes_the_last_step_alone(
     assert told.ways == len(answers) * [("fine", "exact")]
 
 
-def test_a_grip_is_made_firmer_on_few_knots_first(start: WholeHand) -> None:
-    firm = Margin(normal_force=2.0)
-    told = Told(lambda level, share, margin: margin == firm)
-    assert told.regrip(start, firm).exact
+@pytest.mark.parametrize(("grip", "factor"), [(2.0, 4.0), (0.25, 1.0)])
+def test_a_grip_is_made_firmer_on_few_knots_first_from_a_motion_that_presses_as_much(
+    start: WholeHand, grip: float, factor: float
+) -> None:
+    kept, other = Margin(normal_force=0.5), Margin(normal_force=grip)
+    exact = Refined(start, True, Worst("a", 0.0, None), {}, False, False, (), {}, kept)
+    told = Told(lambda level, share, margin: margin == other)
+    assert told.regrip(exact, other).exact
     assert told.ways == [("sparse", SHORT), ("coarse", "exact"), ("fine", "exact")]
+    found, fingers = told.wanted[-1].force, [0, 2]
+    np.testing.assert_array_equal(found[:, fingers], factor * start.force[:, fingers])
+    # What the ground and other contacts bear follows from that.
+    np.testing.assert_array_equal(np.delete(found, fingers, axis=1), np.delete(start.force, fingers, axis=1))
