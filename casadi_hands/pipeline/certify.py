@@ -47,7 +47,7 @@ FINEST = 0.02  # s between samples
 ENOUGH = 0.7  # of a limit: intervals that contribute more are halved
 LEFT = 1 / 8  # of what an interval slips, once it is halved; a cubic spline's error falls to a sixteenth
 GAIN = 0.8  # of how far limits are missed, that more samples must reach to be worth still more
-HANDS_REFINED = 2  # hands of one structure that are tried before fingers get another joint
+HANDS_REFINED = 2  # hands of one structure that are tried, and more only where nothing else is left to try
 
 
 class Certifier:
@@ -72,7 +72,8 @@ class Certifier:
         """Refine the best hand, the next best, then hands with one more joint where those failed.
 
         A certified hand whose replays drop the object makes way for the next best of its structure that does better.
-        The record's best design, which may be one from before, is returned.
+        All hands of a structure are tried only where no finger may have another joint, or where even the certified ones
+        drop the object more often than not. The record's best design, which may be one from before, is returned.
 
         Args:
             found: by the search.
@@ -82,13 +83,19 @@ class Certifier:
             return self.record.offer(self.judge.judge(self.record.design, found.short), REPLAYS)
         while True:
             failing: set[str] = set()
-            for candidate in found.candidates[:HANDS_REFINED]:
+            fewest = np.inf  # drops of a certified hand
+            for k, candidate in enumerate(found.candidates):
+                others = fewest == np.inf and self._more_joints(found, failing) is not None
+                if k >= HANDS_REFINED and (fewest <= LONG_DROPS or others):
+                    break
                 judged, refined, drops = self._certify(candidate, found.short)
                 best = self.record.offer(judged, drops)
                 _, _, share = self._begun
                 if serves(judged, drops, LONG_DROPS if share < 1 else MOST_DROPS):
                     return best
-                if judged.status != "certified":
+                if judged.status == "certified":
+                    fewest = min(fewest, drops)
+                else:
                     self.record.say("refine", f"not certified: {judged.reason}")
                 failing |= failing_fingers(self.model, refined)
                 if refined.barely_rolls:

@@ -87,8 +87,10 @@ def test_the_first_certified_hand_is_returned(monkeypatch: pytest.MonkeyPatch) -
 def test_a_certified_hand_that_drops_the_object_makes_way_for_one_that_drops_it_less(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    for dropped, best, tried in (([12, 0], 2, 2), ([12, 5], 2, 2), ([5, 12], 1, 2), ([4, 0], 2, 2), ([3, 0], 1, 1)):
-        loop = Loop(monkeypatch, [(0, "", False), (0, "", False)], max_joints=3)
+    cases = (([12, 0], 2, 2), ([12, 5], 2, 2), ([5, 12], 1, 2), ([4, 0], 2, 2), ([3, 0], 1, 1))
+    # Those that drop it more often than not make way for all the others.
+    for dropped, best, tried in (*cases, ([12, 7, 3], 3, 3), ([12, 7, 8], 2, 3), ([8, 6, 0], 2, 2)):
+        loop = Loop(monkeypatch, 3 * [(0, "", False)], max_joints=3)
         loop.dropped = dropped
         assert loop.run(found((1, 1), (1, 1), (1, 1))).reason == f"attempt {best}"
         assert len(loop.tried) == tried
@@ -115,6 +117,15 @@ def test_the_finger_that_failed_gets_a_joint_until_none_may(monkeypatch: pytest.
     # The third attempt missed fewest limits; a fourth was made after it, and its run and time are the design's too.
     assert design.reason == "attempt 3"
     assert [run["what"] for run in loop.record.complete(design).stages] == [1, 2, 3, 4]
+
+
+def test_all_hands_are_tried_where_no_finger_may_have_another_joint(monkeypatch: pytest.MonkeyPatch) -> None:
+    verdicts = 3 * [(1, "contact1.cone", False)]
+    loop = Loop(monkeypatch, [*verdicts, (0, "", False)], max_joints=1)
+    assert loop.run(found((1, 1), (1, 1), (1, 1), (1, 1))).status == "certified"
+    loop = Loop(monkeypatch, verdicts, max_joints=2)
+    loop.run(found((1, 1), (1, 1), (1, 1), (1, 1)))
+    assert loop.tried == [(1, 1), (1, 1), (1, 2)]
 
 
 def test_where_no_finger_is_to_blame_those_with_fewest_joints_get_one(monkeypatch: pytest.MonkeyPatch) -> None:
