@@ -38,19 +38,30 @@ def resampled_model(model: Model, schedule: Schedule) -> Model:
 
 
 def resampled(hand: WholeHand, before: Model, after: Model) -> WholeHand:
-    """A motion at the samples of the same task with others."""
+    """A motion at the samples of the same task with others.
+
+    All moves on smooth curves, but fingers on straight ones next to a touch or a lift: they turn abruptly there, and a
+    smooth curve would swing them through the object's surface.
+    """
     was, now = before.schedule.samples, after.schedule.samples
-    between = catmull_rom(was, now)
+    between, straight = catmull_rom(was, now), linear(was, now)
+    interval = np.searchsorted(was, now, side="right") - 1
+
+    def joints(contact: int, angles: Array) -> Array:
+        switches = np.flatnonzero(np.diff(hand.active[:, contact])) + 1
+        abrupt = np.isin(interval, [switches - 1, switches])
+        return np.asarray(np.where(abrupt[:, None], straight, between) @ angles)
+
     quaternion = between @ continuous(hand.palm_quaternion)
     return replace(
         hand,
-        angles=tuple(between @ angles for angles in hand.angles),
+        angles=tuple(map(joints, hand.contacts, hand.angles)),
         palm_position=between @ hand.palm_position,
         palm_quaternion=quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True),
         position=between @ hand.position,
         vector=between @ hand.vector,
         point=np.tensordot(between, hand.point, axes=1),
-        force=np.tensordot(linear(was, now), hand.force, axes=1),
+        force=np.tensordot(straight, hand.force, axes=1),
         active=hand.active[held(was, now)],
     )
 

@@ -97,6 +97,20 @@ def test_a_smooth_motion_comes_back_from_fewer_samples(start: WholeHand) -> None
         np.testing.assert_allclose(found, given, atol=0.05)
 
 
+def test_next_to_a_touch_or_a_lift_a_finger_turns_evenly(start: WholeHand) -> None:
+    _, model = everything()
+    finer = resampled_model(model, model.schedule.halved(np.ones(len(model.schedule.samples) - 1, bool)))
+    there = resampled(start, model, finer)
+    middles = [(angles[1:] + angles[:-1]) / 2 for angles in start.angles]
+    even = [
+        np.isclose(found[1::2], middle, rtol=0, atol=1e-12).all(axis=1)
+        for found, middle in zip(there.angles, middles, strict=True)
+    ]
+    assert not even[0].any()  # it never lifts
+    # The other lifts at the fourth sample and touches at the seventh.
+    assert np.flatnonzero(even[1]).tolist() == [3, 4, 6, 7]
+
+
 def test_a_contact_touches_at_a_sample_as_from_the_last_before_it(start: WholeHand) -> None:
     _, model = everything()
     fewer = resampled_model(model, model.schedule.stepped(0.2))
