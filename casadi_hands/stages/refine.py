@@ -42,6 +42,7 @@ HARD = replace(
 _LOOSE = (("dual_inf_tol", 1e3), ("compl_inf_tol", 1e-3))
 NEARBY = replace(
     FIRM_SOLVE,
+    max_iter=100,
     mu_init=1e-5,
     tol=0.3,
     acceptable_tol=0.3,
