@@ -121,6 +121,19 @@ def held(joints: int, limited: bool) -> Kernel:
     return kernel
 
 
+@cache
+def supplied(joints: int) -> Kernel:
+    """A contact's force at any time: ``passive`` (3) is what no joint supplies of it."""
+    kernel = Kernel("supplied")
+    symbols = free_morphology(kernel, joints)
+    pose, point, angles = kernel.variable("pose", 6), kernel.variable("point", 3), kernel.variable("angles", joints)
+    force = kernel.variable("force", 3)
+    passive = _passive(Scene.declare(kernel).touch(pose, point, angles, symbols), force)
+    kernel.constrain("passive", passive)
+    kernel.cost("passive_force", passive)
+    return kernel
+
+
 def _hold(kernel: Kernel, touch: Touch, force: SX, friction: SX, limited: bool) -> tuple[SX, SX, SX]:
     """Constrain a contact force (3,), object frame; return its normal part, tangential square and passive part.
 
@@ -131,12 +144,16 @@ def _hold(kernel: Kernel, touch: Touch, force: SX, friction: SX, limited: bool) 
     across = ca.sumsqr(force + pressing * touch.normal)
     kernel.constrain("pressing", pressing)
     kernel.constrain("cone", (friction * pressing) ** 2 - across)
-    in_palm = ca.mtimes(touch.rotation, force)
-    passive = finger.unsupplied_force(touch.placed.jacobian, in_palm, LEVER)
+    passive = _passive(touch, force)
     kernel.constrain("passive", passive)
     if limited:
-        kernel.constrain("torque", ca.mtimes(touch.placed.jacobian.T, in_palm))
+        kernel.constrain("torque", ca.mtimes(touch.placed.jacobian.T, ca.mtimes(touch.rotation, force)))
     return pressing, across, passive
+
+
+def _passive(touch: Touch, force: SX) -> SX:
+    """The part (3,), palm frame, of a contact force, object frame, that no joint supplies."""
+    return finger.unsupplied_force(touch.placed.jacobian, ca.mtimes(touch.rotation, force), LEVER)
 
 
 @cache

@@ -287,9 +287,8 @@ class RefineProblem:
         variables = [r.constant(len(start)) for r in shape]
         variables += [r.combine(halves) for r in (self.pose, point, angles, self.force.entries(*span))]
         palm = ("palm_position_between", "palm_quaternion_between")
-        parameters = [*frames, *self._at(("reference", *palm, f"capsule{c}", "radius", "friction"), start)]
-        kernel = finger.held(n, np.isfinite(torque))
-        self._bind(start, kernel, variables, parameters, dict.fromkeys(held, _FREE), f"between{c}")
+        parameters = [*frames, *self._at(("reference", *palm, f"capsule{c}", "radius"), start)]
+        self._bind(start, finger.supplied(n), variables, parameters, {"passive": _FREE}, f"between{c}")
 
     def _bind_clearance(self, i: int) -> None:
         structure, model = self.structure, self.structure.model

@@ -70,6 +70,11 @@ class Contact:
         variables = {"pose": self.place.pose, "point": self.point, "angles": self.finger.angles[0], "force": self.force}
         return {**shape(self.finger), **variables}, {**self.scene, "friction": self.friction}
 
+    @property
+    def supplied(self) -> Block:
+        """The same of the kernel of what no joint supplies."""
+        return self.held[0], self.scene
+
 
 @pytest.mark.parametrize("joints", [1, 2, 3, 4])
 @pytest.mark.parametrize("seed", range(3))
@@ -137,6 +142,10 @@ def test_a_second_force_is_held_as_the_first(joints: int) -> None:
     second = numbers(exact_fingers.held(joints, limited=True), *case.held)
     assert set(second) == {"pressing", "cone", "passive", "torque", "passive_force"}
     for name, value in second.items():
+        np.testing.assert_allclose(value, first[name], rtol=1e-12, atol=1e-12)
+    third = numbers(exact_fingers.supplied(joints), *case.supplied)
+    assert set(third) == {"passive", "passive_force"}
+    for name, value in third.items():
         np.testing.assert_allclose(value, first[name], rtol=1e-12, atol=1e-12)
     # Turned about the normal, the force is as well within the cone; doubled, four times as far from its edge.
     turn = Rotation.from_rotvec(1.1 * case.normal)
@@ -337,6 +346,7 @@ def test_derivatives_agree_with_differences() -> None:
     for kernel, (variables, parameters) in (
         (exact_fingers.contact(2, limited=True), case.contact),
         (exact_fingers.held(2, limited=True), case.held),
+        (exact_fingers.supplied(2), case.supplied),
         (exact_fingers.rolling(1), rolling_block(before, after)),
         (exact_fingers.apart(2, 2, 1, grounded=True), clearance_block(one, place, primitives)),
         (exact_fingers.fingers_apart(2, 3), pair_block(one, other)),
