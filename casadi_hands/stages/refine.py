@@ -38,18 +38,11 @@ HARD = replace(
     extra=(*_NEAR, ("acceptable_constr_viol_tol", _MET)),
 )
 # From an exact motion of the same margins: a larger barrier would first push it off every bound that it rests on.
-# Nor is the best of all motions asked for: one that is good and nearly exact has an exact one very near it.
+NEARBY = replace(HARD, max_iter=40, mu_init=1e-5)
+# Where the best of all motions takes long to find, one that is good and nearly exact has an exact one very near it.
 _LOOSE = (("dual_inf_tol", 1e3), ("compl_inf_tol", 1e-3))
-NEARBY = replace(
-    FIRM_SOLVE,
-    max_iter=100,
-    mu_init=1e-5,
-    tol=0.3,
-    acceptable_tol=0.3,
-    constr_viol_tol=1e-4,
-    extra=(*_NEAR, *_LOOSE),
-)
-PROJECTION = replace(HARD, max_iter=60, mu_init=1e-5)
+GOOD = replace(NEARBY, max_iter=60, tol=0.3, acceptable_tol=0.3, constr_viol_tol=1e-4, extra=(*_NEAR, *_LOOSE))
+PROJECTION = replace(NEARBY, max_iter=60)
 ACCEPTED = 1e-7  # largest violation with which a refined motion is handed on
 HOPELESS = 0.1  # half extents of slip: where firm solves leave more, rolling is out of the structure's reach
 FALLING = 0.5  # of the soft solve's slip: where the firm one leaves more than hopeless, but less than this, it goes on
@@ -214,11 +207,12 @@ class RefineStage:
         upper: Mapping[str, ArrayLike],
         bounds: Mapping[str, tuple[ArrayLike, ArrayLike]],
     ) -> Solution:
-        """The motion nearest to a solution that meets all constraints, or the solution if none is found."""
+        """A motion that meets all constraints, nearest to a good one near a solution; the solution if none is found."""
         if not np.isfinite(solution.violation):
             return solution
-        anchored = {**parameters, **self.built.anchors.at(solution.values)}
-        nearest = self.solver.solve(solution.values, anchored, PROJECTION, lower, upper, bounds)
+        good = self.solver.solve(solution.values, parameters, GOOD, lower, upper, bounds)
+        anchored = {**parameters, **self.built.anchors.at(good.values)}
+        nearest = self.solver.solve(good.values, anchored, PROJECTION, lower, upper, bounds)
         if not nearest.violation < solution.violation:
             return solution
         terms = self.solver.evaluate(nearest.values, parameters)
@@ -226,8 +220,8 @@ class RefineStage:
             nearest,
             terms=terms,
             objective=sum(terms.values()),
-            iterations=solution.iterations + nearest.iterations,
-            seconds=solution.seconds + nearest.seconds,
+            iterations=solution.iterations + good.iterations + nearest.iterations,
+            seconds=solution.seconds + good.seconds + nearest.seconds,
         )
 
     def costs(self, step: Step, start: WholeHand, margin: Margin) -> dict[str, float]:
