@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -31,6 +31,7 @@ from casadi_hands.stages.target import string_of
 Array = NDArray[np.float64]
 # The start is near what is wanted: a small barrier, and no push away from bounds, halve the iterations of a large one.
 OPTIONS = Options(mu_init=1e-3, extra=(("bound_push", 1e-4), ("bound_frac", 1e-4)))
+BROKEN = 1e-2  # violation of a solve that lost its way, from which another barrier leads elsewhere
 FARTHEST_PALM = 2.0  # half extents and rad, how far a palm that may move leaves its given motion
 
 
@@ -155,13 +156,12 @@ class WholeHandStage:
             start["force_perturbed"] = floating.solution.values["force_perturbed"]
         bounds = pose_bounds(model)
         parameters = self._parameters(fingers) | term_weights(self.problem, model, weights)
-        solution = self.solver.solve(
-            start,
-            parameters,
-            options,
-            lower={"activity": flags, "pose": bounds[0]},
-            upper={"activity": flags, "pose": bounds[1]},
-        )
+        lower, upper = ({"activity": flags, "pose": bound} for bound in bounds)
+        solution = self.solver.solve(start, parameters, options, lower, upper)
+        if not solution.violation <= BROKEN:
+            other = replace(options, mu_init=10 * options.mu_init)
+            again = self.solver.solve(start, parameters, other, lower, upper)
+            solution = min(solution, again, key=lambda found: found.violation)
         return self._result(solution, floating, fingers)
 
     def _start_points(self, floating: Floating, fingers: tuple[FingerSeed, ...]) -> Array:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from casadi_hands.nlp import Options
 from casadi_hands.stages.model import Model
 from casadi_hands.stages.object_side import term_weights
 from casadi_hands.stages.synthesis import FingerSeed
@@ -222,3 +226,37 @@ def test_every_weight_moves_its_own_terms(case: Case) -> None:
 
 def test_derivatives_agree_with_differences(case: Case) -> None:
     check_derivatives(case.stage.solver, case.values, case.parameters(case.weights))
+
+
+# Solves that lose their way.
+
+
+@pytest.mark.parametrize(
+    ("violations", "kept"), [([1e-3, None], 0), ([0.7, 1e-4], 1), ([0.7, 0.9], 0), ([np.inf, 0.9], 1)]
+)
+def test_a_solve_that_loses_its_way_is_tried_with_a_larger_barrier(
+    monkeypatch: pytest.MonkeyPatch, violations: list[float | None], kept: int
+) -> None:
+    task, model = everything()
+    count, contacts = len(model.schedule.keyframes), model.contacts + 1
+    stage: Any = WholeHandStage(model, CONTACTS, JOINTS, False)
+    barriers: list[float] = []
+
+    def solve(start: Any, parameters: Any, options: Options, lower: Any, upper: Any) -> Any:
+        assert set(lower) == set(upper) == {"activity", "pose"}
+        barriers.append(options.mu_init)
+        return SimpleNamespace(violation=violations[len(barriers) - 1], number=len(barriers) - 1)
+
+    monkeypatch.setattr(stage, "solver", SimpleNamespace(solve=solve))
+    monkeypatch.setattr(stage, "_start_points", lambda *_: np.zeros((count, contacts, 3)))
+    monkeypatch.setattr(stage, "_result", lambda solution, *_: solution)
+    moving: Any = SimpleNamespace(
+        active=np.ones((count, contacts), bool),
+        pose=np.zeros((count, 6)),
+        force=np.zeros((count, contacts, 3)),
+        solution=SimpleNamespace(values={"force_perturbed": None}),
+    )
+    fingers = tuple(made_up_finger(model, n, count, seed=n) for n in JOINTS)
+    found = stage.solve(moving, fingers, dict(task.weights.whole_hand), Options(mu_init=1e-3))
+    assert found.number == kept
+    assert barriers == ([1e-3] if violations[1] is None else [1e-3, 1e-2])
