@@ -158,9 +158,13 @@ class Model:
 
     def slides(self, contact: int) -> bool:
         """Whether a finger's contact is planned to move on the object without lifting."""
-        if self.regrasp is None or self.regrasp.lifted[:, contact].any():
+        if self.regrasp is None or self.lifts(contact):
             return False
         return bool(np.any(self.regrasp.patches[:, contact] != self.regrasp.patches[0, contact]))
+
+    def lifts(self, contact: int) -> bool:
+        """Whether a finger's contact is planned to lift and touch the object anew."""
+        return self.regrasp is not None and bool(self.regrasp.lifted[:, contact].any())
 
     @property
     def held_back(self) -> bool:

@@ -18,6 +18,7 @@ from casadi_hands.stages.whole_hand import WholeHand
 Array = NDArray[np.float64]
 EASED = 0.5  # s over which a contact that touches or lifts comes to press with its full force, or to let go
 TOOL_TOLERANCE = 5e-3  # half extents, how far a drawing's tool may leave its path between goals
+LIFTING_TIE = 2.0  # of a contact to where it was planned, where it lets go in order to touch elsewhere
 SLIDING_TIE = 0.3  # of a contact to where it was planned to slide; it shall roll if it can
 ROUGHLY = 10.0  # times of what no joint may supply at knots may be so between them, where motions are interpolated
 Bounds = dict[str, tuple[ArrayLike, ArrayLike]]
@@ -172,7 +173,7 @@ class RefineValues:
             values[f"wanted_base{c}"], values[f"wanted_lengths{c}"] = finger.base, finger.lengths
             values[f"wanted_axes{c}"] = finger.axes.reshape(1, -1)
             values[f"capsule{c}"] = model.capsules[c]
-            values[f"tie{c}"] = SLIDING_TIE if model.slides(c) else 1.0
+            values[f"tie{c}"] = SLIDING_TIE if model.slides(c) else LIFTING_TIE if model.lifts(c) else 1.0
             values[f"helper{c}"] = _helpers(motion.point[:, c], model.capsules[c])
         return values
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,7 @@ from casadi_hands.stages.refine import (
     Run,
     Worst,
 )
-from casadi_hands.stages.refine_values import TOOL_TOLERANCE, Margin, longest_run
+from casadi_hands.stages.refine_values import TOOL_TOLERANCE, Margin, RefineValues, longest_run
 from casadi_hands.stages.whole_hand import WholeHand
 from casadi_hands.task import Task, load_task
 from casadi_hands.verify import Audit, audit
@@ -114,6 +115,22 @@ def test_margins_are_bounds_of_contacts_while_they_bear(made_up: MadeUp) -> None
         assert exact[f"between{c}.passive"] == pytest.approx((-0.2, 0.2))
     # None of them is the name of nothing.
     assert {*always, *exact} <= set(made_up.stage.problem.constraint_rows)
+
+
+def test_contacts_that_touch_anew_are_tied_to_their_plan_more_than_others_and_sliding_ones_less(
+    made_up: MadeUp,
+) -> None:
+    model = made_up.model
+    count = len(model.schedule.keyframes)
+    lifted = np.zeros((count, model.contacts), bool)
+    lifted[1, 2] = True
+    patches = np.zeros((count, model.contacts, 3))
+    patches[-1] = 0.1
+    plan: Any = SimpleNamespace(lifted=lifted, patches=patches)
+    planned = RefineValues(made_up.stage.built, replace(model, regrasp=plan)).parameters(made_up.start, Margin())
+    assert (planned["tie0"], planned["tie2"]) == (0.3, 2.0)
+    plain = RefineValues(made_up.stage.built, replace(model, regrasp=None)).parameters(made_up.start, Margin())
+    assert (plain["tie0"], plain["tie2"]) == (1.0, 1.0)
 
 
 def test_the_longest_run_is_that_of_a_sum() -> None:
