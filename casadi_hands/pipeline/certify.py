@@ -85,8 +85,8 @@ class Certifier:
             failing: set[str] = set()
             fewest = np.inf  # drops of a certified hand
             for k, candidate in enumerate(found.candidates):
-                others = fewest == np.inf and self._more_joints(found, failing) is not None
-                if k >= HANDS_REFINED and (fewest <= LONG_DROPS or others):
+                may_grow = fewest == np.inf and self._more_joints(found, failing) is not None
+                if k >= HANDS_REFINED and (fewest <= LONG_DROPS or may_grow):
                     break
                 judged, refined, drops = self._certify(candidate, found.short)
                 best = self.record.offer(judged, drops)

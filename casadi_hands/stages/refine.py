@@ -17,9 +17,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from casadi_hands.nlp import Options, Solution, Solver
 from casadi_hands.stages.model import Model
-from casadi_hands.stages.refine_problem import RefineProblem, Structure
+from casadi_hands.stages.refine_problem import RefineProblem
 from casadi_hands.stages.refine_values import Margin, RefineValues
 from casadi_hands.stages.sampling import shortened
+from casadi_hands.stages.structure import Structure
 from casadi_hands.stages.whole_hand import WholeHand
 
 _NEAR = (("nlp_scaling_method", "none"), ("bound_push", 1e-6), ("bound_frac", 1e-6))

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from casadi_hands.stages import exact_fingers
 from casadi_hands.stages.object_side import tool_path
 from casadi_hands.stages.refine import WEIGHTS
-from casadi_hands.stages.refine_problem import Structure
+from casadi_hands.stages.structure import Structure
 from tests.stages.blocks import frames, numbers, surface
 from tests.stages.example import check_derivatives, doubling_each_weight, drawing, everything
 from tests.stages.refining import MadeUp, carrying, sketching
