@@ -212,18 +212,16 @@ class RefineStage:
         if not np.isfinite(solution.violation):
             return solution
         good = self.solver.solve(solution.values, parameters, GOOD, lower, upper, bounds)
-        anchored = {**parameters, **self.built.anchors.at(good.values)}
-        nearest = self.solver.solve(good.values, anchored, PROJECTION, lower, upper, bounds)
+        near = (good if np.isfinite(good.violation) else solution).values
+        anchored = {**parameters, **self.built.anchors.at(near)}
+        nearest = self.solver.solve(near, anchored, PROJECTION, lower, upper, bounds)
+        solves = (solution, good, nearest)
+        iterations, seconds = sum(s.iterations for s in solves), sum(s.seconds for s in solves)
         if not nearest.violation < solution.violation:
-            return solution
+            return replace(solution, iterations=iterations, seconds=seconds)
         terms = self.solver.evaluate(nearest.values, parameters)
-        return replace(
-            nearest,
-            terms=terms,
-            objective=sum(terms.values()),
-            iterations=solution.iterations + good.iterations + nearest.iterations,
-            seconds=solution.seconds + good.seconds + nearest.seconds,
-        )
+        objective = sum(terms.values())
+        return replace(nearest, terms=terms, objective=objective, iterations=iterations, seconds=seconds)
 
     def costs(self, step: Step, start: WholeHand, margin: Margin) -> dict[str, float]:
         """The weighted terms of a motion, as a step weights them."""

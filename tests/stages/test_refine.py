@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from casadi_hands.design import Design
 from casadi_hands.nlp import Options, Solution
-from casadi_hands.stages import continuation
+from casadi_hands.stages import continuation, refine
 from casadi_hands.stages.continuation import Continuation
 from casadi_hands.stages.floating import FloatingStage
 from casadi_hands.stages.model import Model, build_model
@@ -436,6 +436,10 @@ def test_an_exact_solve_that_is_cut_short_ends_with_the_exact_motion_nearest_to_
     assert solution.objective == pytest.approx(sum(stage.costs(way[0], found.hand, Margin()).values()), rel=0.5)
     # The second goal is 0.05 away, and nothing has to go farther.
     assert np.abs(found.hand.position - before.position).max() < 0.06
+    with monkeypatch.context() as brief:
+        for name in ("GOOD", "PROJECTION"):
+            brief.setattr(refine, name, replace(getattr(refine, name), max_iter=1))
+        assert stage.take(way, before, Margin()).runs[-1].solution.iterations == 3  # what was in vain is told, too
     monkeypatch.setattr(RefineStage, "_projected", lambda self, solution, *_: solution)
     assert not stage.take(way, before, Margin()).met
 
