@@ -163,22 +163,26 @@ class Reads:
         return x if self._rows is None else ca.vertcat(x, ca.mtimes(MX(to_dm(self._others)), x))
 
     def gradient(self, slopes: MX) -> MX:
-        """By the variables, from the gradient by z (size,)."""
-        return slopes if self._rows is None else ca.mtimes(MX(to_dm(self._rows.T)), slopes)
+        """By the variables, from the gradients by what each kernel reads, one after the other."""
+        position = np.concatenate([np.zeros(0, np.int64), *self.positions])
+        first = sparse.csc_array(
+            (np.ones(len(position)), (position, np.arange(len(position)))), (self.size, slopes.numel())
+        )
+        return _through([first] if self._rows is None else _fewest(first, sparse.csc_array(self._rows.T)), slopes)
 
-    def jacobian(self, slopes: MX) -> MX:
+    def jacobian(self, slopes: Gathering) -> Gathering:
         """By the variables, from the Jacobian by z (m, size)."""
-        if self._rows is None or not slopes.nnz():
-            return slopes[:, : self._variables]
-        row, read = _places(slopes.sparsity())
+        if self._rows is None:
+            return slopes
+        row, read = slopes.places()
         source, column, weight = _expand(self._rows, read)
-        return gather_nonzeros((slopes.size1(), self._variables), Places(row[source], column, source, weight), slopes)
+        return slopes.then((slopes.shape[0], self._variables), Places(row[source], column, source, weight))
 
-    def hessian(self, upper: MX) -> MX:
+    def hessian(self, upper: Gathering) -> Gathering:
         """The upper triangle by the variables, from the upper triangle by z (size, size)."""
-        if self._rows is None or not upper.nnz():
-            return upper[: self._variables, : self._variables]
-        left, right = _places(upper.sparsity())
+        if self._rows is None:
+            return upper
+        left, right = upper.places()
         source, row, row_weight = _expand(self._rows, left)
         owner, column, weight = _expand(self._rows, right[source])
         row, weight, source = row[owner], row_weight[owner] * weight, source[owner]
@@ -187,8 +191,7 @@ class Reads:
         weight[apart & (row == column)] *= 2.0
         kept = apart | (row <= column)
         row, column = np.minimum(row, column)[kept], np.maximum(row, column)[kept]
-        shape = self._variables, self._variables
-        return gather_nonzeros(shape, Places(row, column, source[kept], weight[kept]), upper)
+        return upper.then((self._variables, self._variables), Places(row, column, source[kept], weight[kept]))
 
 
 def _places(pattern: Sparsity) -> tuple[Indices, Indices]:
@@ -248,18 +251,54 @@ def together(places: Sequence[Places]) -> Places:
     return Places(row, column, np.concatenate(sources), weight)
 
 
-def gather_nonzeros(shape: tuple[int, int], places: Places, values: MX) -> MX:
-    """A sparse matrix whose nonzeros are weighted sums of the nonzeros of ``values``."""
-    row, column, source, weight = places
-    # The pattern as a matrix whose entries are where its nonzeros stand: many times faster than sorting all.
-    pattern = sparse.csc_array((np.ones(len(row), np.int8), (row, column)), shape=shape)
-    pattern.sort_indices()
-    place = sparse.csc_array((np.arange(pattern.nnz), pattern.indices, pattern.indptr), shape=shape)
-    position = np.asarray(place[row, column]).reshape(-1)
-    sparsity = Sparsity(*shape, pattern.indptr.tolist(), pattern.indices.tolist())
-    if len(row) == pattern.nnz and np.all(weight == 1):
-        order = np.empty(len(row), np.int64)
-        order[position] = source
-        return MX(sparsity, ca.vec(values.nz[order.tolist()]))
-    mix = sparse.csc_array((weight, (position, source)), shape=(pattern.nnz, values.nnz()))
-    return MX(sparsity, ca.mtimes(MX(to_dm(mix)), values.nz[:]))
+class Gathering:
+    """A sparse matrix whose nonzeros are weighted sums of given values.
+
+    Attributes:
+        shape: of the matrix.
+    """
+
+    def __init__(self, shape: tuple[int, int], places: Places, values: int) -> None:
+        """Find the pattern and the sums, of so many values."""
+        self.shape = shape
+        row, column, source, weight = places
+        # The pattern as a matrix whose entries are where its nonzeros stand: many times faster than sorting all.
+        self._pattern = sparse.csc_array((np.ones(len(row), np.int8), (row, column)), shape=shape)
+        self._pattern.sort_indices()
+        count = self._pattern.nnz
+        place = sparse.csc_array((np.arange(count), self._pattern.indices, self._pattern.indptr), shape=shape)
+        position = np.asarray(place[row, column]).reshape(-1)
+        self._steps = [sparse.csc_array((weight, (position, source)), shape=(count, values))]
+
+    def places(self) -> tuple[Indices, Indices]:
+        """Row and column of each nonzero."""
+        column = np.repeat(np.arange(self.shape[1]), np.diff(self._pattern.indptr))
+        return self._pattern.indices.astype(np.int64), column
+
+    def then(self, shape: tuple[int, int], places: Places) -> Gathering:
+        """A matrix whose nonzeros are weighted sums of this one's."""
+        gathering = Gathering(shape, places, self._pattern.nnz)
+        gathering._steps = _fewest(*self._steps, *gathering._steps)
+        return gathering
+
+    def of(self, values: MX) -> MX:
+        """The matrix, of the values in one column."""
+        sparsity = Sparsity(*self.shape, self._pattern.indptr.tolist(), self._pattern.indices.tolist())
+        return MX(sparsity, _through(self._steps, values))
+
+
+def _fewest(first: sparse.csc_array, second: sparse.csc_array) -> list[sparse.csc_array]:
+    """The steps of fewest products: one matrix and then another, or both in one."""
+    both = sparse.csc_array(second @ first)
+    return [both] if both.nnz <= first.nnz + second.nnz else [first, second]
+
+
+def _through(steps: Sequence[sparse.csc_array], values: MX) -> MX:
+    """A dense column, multiplied by each matrix in turn; where one only picks, its entries are picked."""
+    for step in steps:
+        rows = sparse.csr_array(step)
+        if np.all(np.diff(rows.indptr) == 1) and np.all(rows.data == 1):
+            values = ca.vec(values.nz[rows.indices.tolist()])
+        else:
+            values = ca.mac(MX(to_dm(step)), values, MX.zeros(step.shape[0], 1))
+    return values

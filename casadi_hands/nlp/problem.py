@@ -13,10 +13,9 @@ from casadi import MX, Function
 from numpy.typing import ArrayLike, NDArray
 
 from casadi_hands.nlp.assembly import (
+    Gathering,
     KernelFunctions,
-    Places,
     Reads,
-    gather_nonzeros,
     kernel_functions,
     scatter_hessian,
     scatter_jacobian,
@@ -166,12 +165,8 @@ class Problem:
         gradients = [each.call("gradient") for each in mapped]
         f = sum((ca.sum2(total) for total, _, _ in values), MX(0))
         g = self._stacked([each for _, _, each in values])
-        gradient = MX.zeros(x.numel(), 1)
-        if gradients:
-            position = np.concatenate(reads.positions)
-            places = Places(position, np.zeros_like(position), np.arange(len(position)), np.ones(len(position)))
-            slopes = gather_nonzeros((reads.size, 1), places, ca.vertcat(*[ca.vec(slope) for _, slope in gradients]))
-            gradient = reads.gradient(ca.densify(slopes))
+        slopes = ca.vertcat(*[ca.vec(slope) for _, slope in gradients]) if gradients else MX(0, 1)
+        gradient = reads.gradient(slopes)
         # Each function's own: what it took from another would be computed twice.
         same_f = sum((ca.sum2(total) for total, _ in gradients), MX(0))
         same_g, jacobian = self._jacobian(reads, mapped)
@@ -205,19 +200,22 @@ class Problem:
 
     def _jacobian(self, reads: Reads, mapped: list[_Mapped]) -> tuple[MX, MX]:
         """The constraints and their Jacobian."""
-        constraints, parts, sources = [], [], []
+        constraints, places, sources = [], [], []
         for each in mapped:
             bound, pattern = each.bound, each.functions.jacobian_pattern
             g, nonzeros = each.call("jacobian")
             constraints.append(g)
             if pattern.nnz():
-                parts.append(scatter_jacobian(each.position, bound.count, pattern, bound.first_row))
+                places.append(scatter_jacobian(each.position, bound.count, pattern, bound.first_row))
                 sources.append(ca.vec(nonzeros))
-        slopes = _gathered((self.constraints.size, reads.size), parts, sources)
-        return self._stacked(constraints), reads.jacobian(slopes)
+        if not sources:
+            return self._stacked(constraints), MX(self.constraints.size, self.variables.size)
+        values = ca.vertcat(*sources)
+        slopes = Gathering((self.constraints.size, reads.size), together(places), values.numel())
+        return self._stacked(constraints), reads.jacobian(slopes).of(values)
 
     def _hessian(self, reads: Reads, mapped: list[_Mapped], scale: MX, multipliers: MX) -> MX:
-        parts, sources = [], []
+        places, sources = [], []
         for each in mapped:
             bound, pattern = each.bound, each.functions.hessian_pattern
             if pattern.nnz():
@@ -225,14 +223,12 @@ class Problem:
                 local = multipliers[bound.first_row : bound.first_row + width * bound.count]
                 local = ca.reshape(local, width, bound.count) if width else MX.zeros(0, bound.count)
                 scales = ca.repmat(scale, 1, bound.count)
-                parts.append(scatter_hessian(each.position, bound.count, pattern))
+                places.append(scatter_hessian(each.position, bound.count, pattern))
                 sources.append(ca.vec(each.call("hessian", scales, local)))
-        return reads.hessian(_gathered((reads.size, reads.size), parts, sources))
-
-
-def _gathered(shape: tuple[int, int], places: list[Places], sources: list[MX]) -> MX:
-    """A sparse matrix of the entries of ``sources``, whose places ``places`` tell."""
-    return gather_nonzeros(shape, together(places), ca.vertcat(*sources)) if places else MX(*shape)
+        if not sources:
+            return MX(self.variables.size, self.variables.size)
+        values = ca.vertcat(*sources)
+        return reads.hessian(Gathering((reads.size, reads.size), together(places), values.numel())).of(values)
 
 
 def _inputs(bound: _Bound, read: MX, p: MX) -> tuple[MX, MX, MX]:
