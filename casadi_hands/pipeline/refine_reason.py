@@ -50,6 +50,7 @@ _LIMITS = {  # by the constraint's kernel, without the finger's number, and name
     "pushed.sum": _Limit("stay on its path under the perturbation", "", _PUSHED, ("disturbance_radius",)),
     "contact.on_object": _Limit("stay on the object's surface", "length", _REACH, (*_GAP, *_BALANCE, "slip")),
     "contact.on_link": _Limit("reach its contact", "length", _REACH, (*_GAP, *_BALANCE, "slip")),
+    "contact.regular": _Limit("follow without being stretched out or folded", "", _REACH, (*_GAP, "slip")),
     "contact.pressing": _Limit("press firmly enough", "force", _GRIP, ("pull",)),
     "contact.cone": _Limit("press without slipping", "", _GRIP, ("friction_excess", "slip")),
     "contact.passive": _Limit("supply its force with its joints", "force", _SIDE, ("unsupplied_force",)),

@@ -11,6 +11,7 @@ from casadi import SX
 from casadi_hands.geometry import norm
 from casadi_hands.motion import conjugate, derivative, rotation_matrix
 from casadi_hands.nlp import Kernel
+from casadi_hands.stages.branch import SIZES, regularity
 from casadi_hands.stages.finger_symbols import FingerSymbols, PlacedFinger, morphology
 from casadi_hands.stages.soft_fingers import distances
 from casadi_hands.stages.soft_object import placed
@@ -87,7 +88,8 @@ class Scene:
 def contact(joints: int, limited: bool) -> Kernel:
     """One touching contact at one knot: on both surfaces, normals opposed, in the cone, supplied by the joints.
 
-    Constraints: ``on_object`` (1), ``on_link`` (3: surface and normal, see ``Touch``) and those of ``_hold``.
+    Constraints: ``on_object`` (1), ``on_link`` (3: surface and normal, see ``Touch``), those of ``_hold`` and, of a
+    finger that has branches, ``regular`` (1: its regularity on the wanted one).
     The cost of friction is the fourth power of the share in use.
     """
     kernel = Kernel("contact")
@@ -98,6 +100,10 @@ def contact(joints: int, limited: bool) -> Kernel:
     friction, tie = kernel.parameter("friction"), kernel.parameter("tie")
     wanted_point, wanted_force = kernel.parameter("wanted_point", 3), kernel.parameter("wanted_force", 3)
     touch = scene.touch(pose, point, angles, symbols)
+    if joints in SIZES:
+        kernel.constrain(
+            "regular", ca.dot(kernel.parameter("branch", SIZES[joints]), regularity(touch.placed.jacobian))
+        )
     kernel.constrain("on_object", touch.off_object)
     kernel.constrain("on_link", touch.off_link)
     pressing, across, passive = _hold(kernel, touch, force, friction, limited)

@@ -180,6 +180,8 @@ class RefineStage:
         values, parameters = given.start(start), given.parameters(start, margin, wanted)
         lower, upper = given.bounds()
         always, exact = given.constraint_bounds(margin)
+        branches, regular = given.regular(start)
+        parameters, always = parameters | branches, always | regular
         runs: list[Run] = []
         slips: dict[str, float] = {}
         most = 0.0

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from casadi_hands.nlp import Kernel, Problem, Rows
 from casadi_hands.stages import exact_fingers as finger
 from casadi_hands.stages import exact_object as body
+from casadi_hands.stages.branch import SIZES
 from casadi_hands.stages.model import Model
 from casadi_hands.stages.object_side import CLEARANCE, GOAL_TOLERANCE, MOST_FORCE
 from casadi_hands.stages.projection import Anchors
@@ -105,6 +106,8 @@ class RefineProblem:
         for c, n in zip(structure.contacts, structure.joints, strict=True):
             problem.parameter(f"helper{c}", (count, 3))
             problem.parameter(f"tie{c}", (1, 1))
+            if n in SIZES:
+                problem.parameter(f"branch{c}", (count, SIZES[n]))
             for name, width in (("frames", 9 * n), ("wanted_base", 2), ("wanted_lengths", n), ("wanted_axes", 2 * n)):
                 problem.parameter(f"{name}{c}", (1, width))
 
@@ -222,7 +225,9 @@ class RefineProblem:
         touching = np.flatnonzero(structure.touching[:, i])
         parameters = [*frames, *self._scene(c, touching)]
         parameters += self._at(("friction", f"tie{c}", f"wanted_point{c}", f"wanted_force{c}"), touching)
-        surfaces = {"on_object": (0.0, 0.0), "on_link": (0.0, 0.0)}
+        if n in SIZES:
+            parameters += self._at((f"branch{c}",), touching)
+        surfaces = {"on_object": (0.0, 0.0), "on_link": (0.0, 0.0), "regular": _FREE}
         kernel = finger.contact(n, np.isfinite(torque))
         variables = rows(touching, self.pose, point, self.force.entries(*span), angles)
         self._bind(touching, kernel, variables, parameters, surfaces | held, f"contact{c}")

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from casadi_hands.geometry import nearest_on_axis
 from casadi_hands.motion import continuous
+from casadi_hands.stages.branch import REGULAR, SIZES, branches
 from casadi_hands.stages.model import Model
 from casadi_hands.stages.object_side import MOST_FORCE, MOST_TURN, tool_path
 from casadi_hands.stages.refine_problem import RefineProblem
@@ -81,6 +82,18 @@ class RefineValues:
             tolerance[model.schedule.goal_samples] = model.goal_tolerance[0]
             always["tool_point.on_path"] = (-tolerance, tolerance)
         return always, exact
+
+    def regular(self, motion: WholeHand) -> tuple[dict[str, ArrayLike], Bounds]:
+        """Parameters and bounds that keep each finger on the branch that a motion is on, nearly all of the time."""
+        structure = self.structure
+        parameters: dict[str, ArrayLike] = {}
+        bounds: Bounds = {}
+        for i, (c, n) in enumerate(zip(structure.contacts, structure.joints, strict=True)):
+            if n in SIZES:
+                parameters[f"branch{c}"] = branch = branches(self.model, motion, i, structure.active[:, i])
+                kept = np.abs(branch[structure.touching[:, i]]).sum(axis=1) > 0
+                bounds[f"contact{c}.regular"] = (np.where(kept, REGULAR, -np.inf)[:, None], np.inf)
+        return parameters, bounds
 
     def _slip_allowed(self, column: int) -> Array:
         """Share (K, 1) of the slip tolerance, by length, of each interval in which a contact touches."""
@@ -169,6 +182,8 @@ class RefineValues:
         for c in self.structure.columns:
             values[f"wanted_point{c}"], values[f"wanted_force{c}"] = wanted.point[:, c], wanted.force[:, c]
         for c, finger in zip(self.structure.contacts, wanted.fingers, strict=True):
+            if finger.joints in SIZES:
+                values[f"branch{c}"] = 0.0
             values[f"frames{c}"] = finger.frames.transpose(0, 2, 1).reshape(1, -1)
             values[f"wanted_base{c}"], values[f"wanted_lengths{c}"] = finger.base, finger.lengths
             values[f"wanted_axes{c}"] = finger.axes.reshape(1, -1)

@@ -46,6 +46,7 @@ class Contact:
         self.force = 0.5 * rng.normal(size=3) - rng.uniform(0.5, 2) * self.normal
         self.wanted_point, self.wanted_force = rng.normal(size=(2, 3))
         self.tie = rng.uniform(0.1, 1)
+        self.branch = rng.normal(size={2: 3, 3: 1}.get(joints, 0))
 
     @property
     def scene(self) -> dict[str, object]:
@@ -57,11 +58,13 @@ class Contact:
         """Variables and parameters of the contact's kernel."""
         variables = {"pose": self.place.pose, "point": self.point, "force": self.force, "angles": self.finger.angles[0]}
         wanted = {"wanted_point": self.wanted_point, "wanted_force": self.wanted_force}
+        kept = {"branch": self.branch} if self.branch.size else {}
         return {**shape(self.finger), **variables}, {
             **self.scene,
             "friction": self.friction,
             "tie": self.tie,
             **wanted,
+            **kept,
         }
 
     @property
@@ -106,6 +109,11 @@ def test_a_contact_s_numbers_are_those_of_numpy_and_pinocchio(joints: int, seed:
     np.testing.assert_allclose(found["passive"], passive, atol=1e-6)
     np.testing.assert_allclose(found["passive_force"], passive @ passive, atol=1e-6)
     np.testing.assert_allclose(found["torque"], jacobian.T @ in_palm, atol=1e-6)
+    assert ("regular" in found) == (joints in (2, 3))
+    if joints == 2:
+        np.testing.assert_allclose(found["regular"], case.branch @ np.cross(*jacobian.T), atol=1e-6)
+    if joints == 3:
+        np.testing.assert_allclose(found["regular"], case.branch * np.linalg.det(jacobian), atol=1e-6)
     np.testing.assert_allclose(
         found["stay_point"], case.tie**2 * ((case.point - case.wanted_point) ** 2).sum(), rtol=1e-12
     )
@@ -345,6 +353,7 @@ def test_derivatives_agree_with_differences() -> None:
     angles = rng.normal(size=(3, 2))
     for kernel, (variables, parameters) in (
         (exact_fingers.contact(2, limited=True), case.contact),
+        (exact_fingers.contact(3, limited=True), Contact(3, 1).contact),
         (exact_fingers.held(2, limited=True), case.held),
         (exact_fingers.supplied(2), case.supplied),
         (exact_fingers.rolling(1), rolling_block(before, after)),

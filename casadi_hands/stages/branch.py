@@ -1,0 +1,96 @@
+"""The branch of its kinematics that a finger is on while it touches, and stays on.
+
+Where a finger is stretched out or folded, its Jacobian is singular: some forces are out of its reach, and only few ways
+lead through such a pose. A motion on few knots steps over it unnoticed, and on denser ones no exact motion is near.
+Fingers of two or three joints can be kept from it: while one stays on its side of all singular poses, what
+``regularity`` gives does not vanish.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pinocchio as pin
+from casadi import SX
+from numpy.typing import NDArray
+
+from casadi_hands.kinematics import finger_kinematics
+from casadi_hands.stages.model import Model
+from casadi_hands.stages.whole_hand import WholeHand
+
+Array = NDArray[np.float64]
+SIZES = {2: 3, 3: 1}  # of the regularity, by number of joints; with others a finger has no branches, or may change them
+REGULAR = 0.1  # least regularity, of its median over a touch
+MOSTLY = 0.8  # of a touch that a finger has to be on one branch, to be kept on it all the while
+_SINGULAR = 1e-3  # sine of the angle between joints' levers: a finger that is usually below it is on no branch
+
+
+def regularity(jacobian: SX) -> SX:
+    """What vanishes where a Jacobian (3, n) is singular: its determinant (1,), or the product of its columns (3,)."""
+    return ca.det(jacobian) if jacobian.shape[1] == 3 else ca.cross(jacobian[:, 0], jacobian[:, 1])
+
+
+def branches(model: Model, motion: WholeHand, finger: int, active: NDArray[np.bool_]) -> Array:
+    """What the regularity at each knot is to be multiplied with; at least ``REGULAR`` is asked of the result.
+
+    Args:
+        model: the task.
+        motion: that tells the branches.
+        finger: index of the finger among the motion's; of two or three joints.
+        active: (S,) when its contact touches, held from its knot to the next.
+
+    Returns:
+        (S, size), one over the median where the motion is on its branch, zeros where none is to be kept.
+    """
+    jacobians = _jacobians(model, motion, finger)
+    measured, most = _regularities(jacobians), np.prod(np.linalg.norm(jacobians, axis=1), axis=1)
+    begins = active & ~np.append(False, active[:-1])
+    touch = np.where(active | np.append(False, active[:-1]), np.cumsum(begins), 0)
+    result = np.zeros_like(measured)
+    for k in range(1, touch.max(initial=0) + 1):
+        at = np.flatnonzero(touch == k)
+        if np.median(np.linalg.norm(measured[at], axis=1)) > _SINGULAR * np.median(most[at]):
+            result[at] = _kept(measured[at])
+    return result
+
+
+def _kept(measured: Array) -> Array:
+    """The branch (K, size) of one touch, of its regularities."""
+    turns = np.einsum("ks,ks->k", measured[1:], measured[:-1]) < 0
+    sides = np.where(np.append(0, np.cumsum(turns)) % 2, -1.0, 1.0)
+    mean = sides.mean()
+    sizes = np.linalg.norm(measured, axis=1)
+    median = np.median(sizes)
+    if (1 + abs(mean)) / 2 < MOSTLY:
+        return np.zeros_like(measured)
+    units = measured / np.maximum(sizes, 1e-3 * median)[:, None]
+    return np.asarray(np.sign(mean) * sides[:, None] * units / median)
+
+
+def _regularities(jacobians: Array) -> Array:
+    """``regularity`` (S, size) of Jacobians (S, 3, n)."""
+    if jacobians.shape[2] == 3:
+        return np.asarray(np.linalg.det(jacobians))[:, None]
+    return np.asarray(np.cross(jacobians[:, :, 0], jacobians[:, :, 1]))
+
+
+def _jacobians(model: Model, motion: WholeHand, finger: int) -> Array:
+    """(S, 3, n) of a finger's contact on the object, palm frame, half extents/rad."""
+    own, angles = motion.fingers[finger], motion.angles[finger]
+    count, joints = angles.shape
+    given = (np.append(own.base, 0)[:, None], own.axis_vectors.T, own.lengths[:, None])
+    inputs = [np.tile(each, count) for each in given]
+    origins, rotations, *_ = finger_kinematics(joints).map(count)(*inputs, angles.T, np.zeros((3, count)))
+    origin = np.asarray(origins).T.reshape(count, joints, 3)
+    turned = np.asarray(rotations).T.reshape(count, joints, 3, 3)  # of each link's axes, one a row
+    axes = np.einsum("kjab,ja->kjb", turned, own.axis_vectors)
+    contact = _in_palm(model, motion, motion.point[:, motion.contacts[finger]])
+    return np.asarray(np.cross(axes, contact[:, None] - origin).transpose(0, 2, 1))
+
+
+def _in_palm(model: Model, motion: WholeHand, points: Array) -> Array:
+    """Points (S, 3) of the object's frame in the palm's, one a sample."""
+    reference = pin.Quaternion(*model.reference).matrix()
+    world = [p + pin.exp3(v) @ reference @ x for p, v, x in zip(motion.position, motion.vector, points, strict=True)]
+    palms = zip(world, motion.palm_position, motion.palm_quaternion, strict=True)
+    return np.array([pin.Quaternion(*q).matrix().T @ (x - p) for x, p, q in palms])
