@@ -11,13 +11,16 @@ import numpy as np
 
 from casadi_hands.errors import SolveError
 from casadi_hands.reasons import Reason
-from casadi_hands.search.score import THRESHOLD, finger_scores, worst_miss
+from casadi_hands.search.score import THRESHOLD, finger_scores, folding, worst_miss
 from casadi_hands.search.shortcoming import shortcoming
 from casadi_hands.search.work import combine_fingers, design_finger, run_all
 from casadi_hands.stages.synthesis import FingerSeed, Synthesised
 from casadi_hands.stages.target import Target
 
 Progress = Callable[[str], None]
+# What a finger that passes a singular pose counts as worse than one that does not, and as what share a hand does:
+# where others serve about as well they are taken.
+FOLDED_FINGER, FOLDED_HAND = 0.02, 0.1
 
 
 @dataclass(frozen=True)
@@ -45,7 +48,7 @@ class Found:
     """What the search ends with.
 
     Attributes:
-        candidates: hands of the last round, best objective first.
+        candidates: hands of the last round, best first.
         farthest: how far the worst of those fingers is from its contact, half extents.
         short: why fingers stayed above the threshold at the most joints allowed, one reason each.
     """
@@ -133,12 +136,13 @@ class Search:
         for c in growing:
             self.grown[c] = joints[c]
             pool = [r for args, r in zip(work, results, strict=True) if args[1] == c]
-            self.pools[c] = sorted(((_alone(r), r.fingers[0]) for r in pool), key=lambda pair: pair[0])
+            scored = [(_alone(r) + FOLDED_FINGER * folding(self.target, r), r.fingers[0]) for r in pool]
+            self.pools[c] = sorted(scored, key=lambda pair: pair[0])
         for args, result in zip(work, results, strict=True):
             self._record(f"finger {self.names[args[1]]}, {args[2]} joints", args[3][3], result)
 
     def _recombine(self, round_key: int) -> list[Candidate]:
-        """Hands of the best fingers and of sampled ones, best objective first."""
+        """Hands of the best fingers and of sampled ones, best first: by objective, and folding counts as worse."""
         rng = np.random.default_rng((self.seed, 1_000_003, round_key))
         chosen: list[tuple[int, ...]] = []
         for trial in range(self.recombinations):
@@ -159,7 +163,11 @@ class Search:
             scores = tuple(float(s) for s in finger_scores(self.target, result))
             candidates.append(Candidate(result, scores, trial))
             self._record(f"hand of {'+'.join(str(f.joints) for f in result.fingers)} joints", trial, result)
-        return sorted(candidates, key=lambda candidate: candidate.hand.solution.objective)
+
+        def cost(candidate: Candidate) -> float:
+            return candidate.hand.solution.objective * (1 + FOLDED_HAND * folding(self.target, candidate.hand))
+
+        return sorted(candidates, key=cost)
 
     def take_runs(self) -> list[dict[str, Any]]:
         """Records of the solves since the last call, for ``stages`` of result.json."""

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from casadi_hands.stages.branch import folds
 from casadi_hands.stages.finger_numbers import contact_kinematics
 from casadi_hands.stages.grasp import friction_edges, grasp_map
 from casadi_hands.stages.synthesis import Synthesised
@@ -46,6 +47,17 @@ def finger_scores(target: Target, hand: Synthesised) -> Array:
         active = target.active[:, contact]
         scores[i] += float(passive[active, i].mean()) if active.any() else 0.0
     return scores
+
+
+def folding(target: Target, hand: Synthesised) -> bool:
+    """Whether a finger passes a singular pose while it touches: then it may well have no exact motion."""
+    return any(
+        folds(
+            contact_kinematics(finger, target.string_of(contact), target.link_radius)[1],
+            target.active[:, contact],
+        )
+        for finger, contact in zip(hand.fingers, hand.contacts, strict=True)
+    )
 
 
 def worst_miss(target: Target, hand: Synthesised, contact: int) -> tuple[float, float]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from casadi_hands.stages.branch import branches
+from casadi_hands.stages.branch import branches, folds
 from casadi_hands.stages.synthesis import FingerSeed
 from casadi_hands.stages.whole_hand import WholeHand
 from tests.stages.example import PinFinger, everything, made_up_solution
@@ -111,3 +111,25 @@ def test_a_finger_that_is_always_stretched_out_is_kept_on_no_branch(joints: int)
     found, size = sides(with_elbow(joints, np.linspace(1e-9, 1e-7, COUNT)))
     assert 0 < size.max() < 1e-6
     np.testing.assert_array_equal(found, 0)
+
+
+@pytest.mark.parametrize("joints", [2, 3])
+def test_a_finger_folds_where_it_passes_a_singular_pose_or_is_near_one_while_it_touches(joints: int) -> None:
+    always = np.ones(COUNT, bool)
+
+    def folds_with(elbow: Array, active: Array) -> bool:
+        return folds(bending(with_elbow(joints, elbow))[1], active)
+
+    bent, over = np.full(COUNT, 0.8), np.where(np.arange(COUNT) < 4, 0.8, -0.8)
+    assert not folds_with(bent, always)
+    assert folds_with(over, always)
+    straight = np.where(np.arange(COUNT) == 4, 0.01, bent)
+    assert folds_with(straight, always)
+    assert not folds_with(straight, np.arange(COUNT) != 4)
+    assert not folds_with(over, np.arange(COUNT) != 4)
+    assert not folds_with(over, np.zeros(COUNT, bool))
+
+
+@pytest.mark.parametrize("joints", [1, 4])
+def test_fingers_of_one_joint_or_many_never_fold(joints: int) -> None:
+    assert not folds(np.zeros((5, 3, joints)), np.ones(5, bool))
