@@ -22,7 +22,7 @@ from casadi_hands.stages.whole_hand import WholeHand
 
 Array = NDArray[np.float64]
 SIZES = {2: 3, 3: 1}  # of the regularity, by number of joints; with others a finger has no branches, or may change them
-REGULAR = 0.1  # least regularity, of its median over a touch
+REGULAR = 0.25  # least regularity, of its median over a touch
 MOSTLY = 0.8  # of a touch that a finger has to be on one branch, to be kept on it all the while
 # Regularity over that of levers as long that are at right angles to each other:
 NEAR = 0.02  # below it a pose is nearly singular
