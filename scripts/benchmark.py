@@ -41,6 +41,7 @@ METHODS: dict[str, Method] = {
     "the same, cones as constraints too": partial(ours, constrained=True),
     "IPOPT, limited-memory Hessian": partial(ours, limited_memory=True),
     "SciPy L-BFGS-B, our gradients": partial(by_scipy, name="L-BFGS-B"),
+    "SciPy L-BFGS-B, the same interpreted": partial(by_scipy, name="L-BFGS-B", interpreted=True),
     "SciPy BFGS, our gradients": partial(by_scipy, name="BFGS"),
     "Opti, automatic Hessian": opti,
     "Opti, expanded": partial(opti, expand=True),

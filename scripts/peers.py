@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from typing import Any
+from unittest.mock import patch
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from casadi_hands.nlp import Kernel, Options, Problem, Rows, Solution, Solver
+from casadi_hands.nlp import Kernel, Options, Problem, Rows, Solution, Solver, assembly, machine_code
 from casadi_hands.nlp.assembly import to_dm
 
 Vector = NDArray[np.float64]
@@ -133,15 +134,30 @@ class _OutOfTimeError(Exception):
     """The limit was reached."""
 
 
-def by_scipy(build: Build, programs: Sequence[Posed], limit: float, *, name: str) -> Run:
+def by_scipy(build: Build, programs: Sequence[Posed], limit: float, *, name: str, interpreted: bool = False) -> Run:
     """A method of ``scipy.optimize.minimize``, given our exact gradients.
 
     L-BFGS-B takes the bounds. BFGS has none: it gets x = middle + half width · sin y for bounded variables.
+
+    Args:
+        build: makes the stage.
+        programs: to solve, one after the other.
+        limit: s for each.
+        name: of the method.
+        interpreted: with kernels as CasADi runs them where nothing is compiled.
     """
     began = time.perf_counter()
-    gradient = build().solver.functions["grad_f"]
+    with _interpreted() if interpreted else nullcontext():
+        gradient = build().solver.functions["grad_f"]
     attempts = [_scipy_attempt(name, gradient, posed, limit) for posed in programs]
     return Run(time.perf_counter() - began - sum(attempt.seconds for attempt in attempts), attempts)
+
+
+@contextmanager
+def _interpreted() -> Iterator[None]:
+    """Build problems meanwhile as where there is no compiler."""
+    with patch.object(machine_code, "compiler", lambda: None), patch.object(assembly, "_known", {}):
+        yield
 
 
 def _scipy_attempt(name: str, gradient: ca.Function, posed: Posed, limit: float) -> Attempt:

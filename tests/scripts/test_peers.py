@@ -18,6 +18,7 @@ METHODS: dict[str, Method] = {
     "ours": ours,
     "limited memory": partial(ours, limited_memory=True),
     "L-BFGS-B": partial(by_scipy, name="L-BFGS-B"),
+    "L-BFGS-B, interpreted": partial(by_scipy, name="L-BFGS-B", interpreted=True),
     "BFGS": partial(by_scipy, name="BFGS"),
     "opti": opti,
     "expanded": partial(opti, expand=True),
