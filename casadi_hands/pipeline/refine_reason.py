@@ -39,6 +39,7 @@ _PUSHED = "weaker perturbations, more friction or more fingers"
 _BALANCE, _GAP = ("residual", "residual_between"), ("gap", "gap_between")
 _MOVED = _Limit("be moved as planned by the forces of its contacts", "", _PACE, _BALANCE)
 _CLEAR = _Limit("stay clear of the other bodies", "length", _ROOM, ("penetration",))
+_EACH_OTHER = _Limit("stay clear of each other", "length", _ROOM, ("penetration",))
 _GROUND = _Limit(
     "rest on the ground as planned", "", "goals at which it stands on the ground, or a rougher one", (*_GAP, "slip")
 )
@@ -70,7 +71,8 @@ _LIMITS = {  # by the constraint's kernel, without the finger's number, and name
     "apart.clear": _CLEAR,
     "apart_touching.clear": _CLEAR,
     "apart_between.clear": _CLEAR,
-    "fingers_apart.clear": _Limit("stay clear of each other", "length", _ROOM, ("penetration",)),
+    "fingers_apart.clear": _EACH_OTHER,
+    "fingers_between.clear": _EACH_OTHER,
     "object_apart.palm": _Limit("stay clear of the palm", "length", "goals farther from the palm", ("penetration",)),
     "object_apart.ground": _Limit("stay above the ground", "length", "goals above the ground", ("penetration",)),
     "tool_point.on_path": _Limit("draw its path", "length", _PACE, ("goal_position",)),

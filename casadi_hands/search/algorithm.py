@@ -18,9 +18,9 @@ from casadi_hands.stages.synthesis import FingerSeed, Synthesised
 from casadi_hands.stages.target import Target
 
 Progress = Callable[[str], None]
-# What a finger that passes a singular pose counts as worse than one that does not, and as what share a hand does:
+# A finger that passes a singular pose counts as worse than one that does not by this, and its hand by this share:
 # where others serve about as well they are taken.
-FOLDED_FINGER, FOLDED_HAND = 0.02, 0.1
+FOLDED_FINGER, FOLDED_HAND = 0.05, 0.1
 
 
 @dataclass(frozen=True)

@@ -49,15 +49,11 @@ def finger_scores(target: Target, hand: Synthesised) -> Array:
     return scores
 
 
-def folding(target: Target, hand: Synthesised) -> bool:
-    """Whether a finger passes a singular pose while it touches: then it may well have no exact motion."""
-    return any(
-        folds(
-            contact_kinematics(finger, target.string_of(contact), target.link_radius)[1],
-            target.active[:, contact],
-        )
-        for finger, contact in zip(hand.fingers, hand.contacts, strict=True)
-    )
+def folding(target: Target, hand: Synthesised) -> int:
+    """How many fingers pass a singular pose while they touch: those may well have no exact motion."""
+    placed = zip(hand.fingers, hand.contacts, strict=True)
+    jacobians = [(contact_kinematics(f, target.string_of(c), target.link_radius)[1], c) for f, c in placed]
+    return sum(folds(each, target.active[:, c]) for each, c in jacobians)
 
 
 def worst_miss(target: Target, hand: Synthesised, contact: int) -> tuple[float, float]:

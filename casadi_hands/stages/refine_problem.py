@@ -19,6 +19,7 @@ from casadi_hands.stages.synthesis import AXIS_RANGE
 
 JOINT_MARGIN = 0.005  # rad, so that a smooth curve through the knots stays within the limits between them
 _FREE = (-np.inf, np.inf)
+_PALM_BETWEEN = ("palm_position_between", "palm_quaternion_between")
 _HELD = {"pressing": (0.0, np.inf), "cone": (0.0, np.inf)}
 
 
@@ -98,7 +99,7 @@ class RefineProblem:
         for name, width in (("palm_position", 3), ("palm_quaternion", 4), ("wanted_pose", 6)):
             problem.parameter(name, (count, width))
         for name, width in (("palm_position_between", 3), ("palm_quaternion_between", 4)):
-            problem.parameter(name, (count - 1, width))
+            problem.parameter(name, (len(structure.inner.share), width))
         for c in structure.columns:
             problem.parameter(f"capsule{c}", (1, 7))
             for name in ("wanted_point", "wanted_force"):
@@ -132,12 +133,6 @@ class RefineProblem:
         """Bind a block, and keep the knot that each of its instances is at, or begins at."""
         self.problem.bind(kernel, rows, parameters, bounds, name)
         self.knots_of[name or kernel.name] = knots
-
-    def _halves(self, knots: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Weights (K, knots) that give the middle between each of some knots and the next one."""
-        weights = np.zeros((len(knots), self.knots))
-        weights[np.arange(len(knots)), knots] = weights[np.arange(len(knots)), knots + 1] = 0.5
-        return weights
 
     # The object.
 
@@ -245,40 +240,44 @@ class RefineProblem:
         parameters += self._at((f"helper{c}", "step"), start)
         self._bind(start, finger.rolling(n), variables, parameters, {"no_slip": _FREE}, f"rolling{c}")
         # Else a finger may be stretched out between knots, or folded, and find itself there on more of them.
-        halves = self._halves(start)
-        variables = [r.constant(len(start)) for r in shape]
-        variables += [r.combine(halves) for r in (self.pose, point, angles, self.force.entries(*span))]
-        palm = ("palm_position_between", "palm_quaternion_between")
-        parameters = [*frames, *self._at(("reference", *palm, f"capsule{c}", "radius"), start)]
-        self._bind(start, finger.supplied(n), variables, parameters, {"passive": _FREE}, f"between{c}")
+        inner = structure.inner.within(structure.active[:-1, i])
+        weights, knots = structure.inner.weights(inner), structure.inner.interval[inner]
+        variables = [r.constant(len(inner)) for r in shape]
+        variables += [r.combine(weights) for r in (self.pose, point, angles, self.force.entries(*span))]
+        parameters = [*frames, *self._at(("reference", *_PALM_BETWEEN, f"capsule{c}", "radius"), inner)]
+        self._bind(knots, finger.supplied(n), variables, parameters, {"passive": _FREE}, f"between{c}")
 
     def _bind_clearance(self, i: int) -> None:
         structure, model = self.structure, self.structure.model
         c, n = structure.contacts[i], structure.joints[i]
         touched = int(np.argmin(np.abs(model.primitives - model.capsules[c]).sum(axis=1)))
-        touching, idle = structure.touching[:, i], np.flatnonzero(~structure.active[:-1, i])
-        names = (
-            "reference",
-            "palm_position",
-            "palm_quaternion",
-            "radius",
-            "palm_radius",
-            "ground_height",
-            "primitives",
-        )
+        touching, idle = structure.touching[:, i], structure.inner.within(~structure.active[:-1, i])
 
-        def bind(kind: str, knots: NDArray[np.int64], rows: list[Rows], least: float, skipped: int | None) -> None:
+        def bind(
+            kind: str,
+            knots: NDArray[np.int64],
+            rows: list[Rows],
+            parameters: list[NDArray[np.int64]],
+            least: float,
+            skipped: int | None,
+        ) -> None:
             kernel = finger.apart(n, len(model.primitives), skipped, model.ground is not None)
-            rows, at = [*[r.constant(len(knots)) for r in self.shape[i]], *rows], (f"frames{c}", *names)
-            self._bind(knots, kernel, rows, self._at(at, knots), {"clear": (least, np.inf)}, f"{kind}{c}")
+            rows = [*[r.constant(len(knots)) for r in self.shape[i]], *rows]
+            self._bind(knots, kernel, rows, parameters, {"clear": (least, np.inf)}, f"{kind}{c}")
+
+        def scene(at: NDArray[np.int64], *palm: str) -> list[NDArray[np.int64]]:
+            rest = ("radius", "palm_radius", "ground_height", "primitives")
+            return self._at((f"frames{c}", "reference", *palm, *rest), at)
 
         for kind, where, skipped in (("apart_touching", touching, touched), ("apart", ~touching, None)):
             knots = np.flatnonzero(where)
             if len(knots):
-                bind(kind, knots, [self.pose.take(knots), self.angles[i].take(knots)], CLEARANCE, skipped)
+                rows = [self.pose.take(knots), self.angles[i].take(knots)]
+                bind(kind, knots, rows, scene(knots, "palm_position", "palm_quaternion"), CLEARANCE, skipped)
         if len(idle):  # a lifted finger is quick, and must not cut through the object's edge between two knots
-            halves = self._halves(idle)
-            bind("apart_between", idle, [self.pose.combine(halves), self.angles[i].combine(halves)], 0.0, None)
+            weights, knots = structure.inner.weights(idle), structure.inner.interval[idle]
+            rows = [self.pose.combine(weights), self.angles[i].combine(weights)]
+            bind("apart_between", knots, rows, scene(idle, *_PALM_BETWEEN), 0.0, None)
 
     def _bind_shape(self, i: int) -> None:
         """A finger's morphology, and its joints' motion: mirrored at both ends, so that it starts and ends at rest."""
@@ -301,13 +300,20 @@ class RefineProblem:
     def _bind_pair(self, i: int, j: int) -> None:
         structure = self.structure
         c, d = structure.contacts[i], structure.contacts[j]
-        rows: list[Rows] = []
-        for k in (i, j):
-            rows += [*[r.constant(self.knots) for r in self.shape[k]], self.angles[k]]
         kernel = finger.fingers_apart(structure.joints[i], structure.joints[j])
         parameters = self._at((f"frames{c}", f"frames{d}", "radius"))
+
+        def bind(kind: str, knots: NDArray[np.int64], angles: list[Rows], least: float) -> None:
+            rows: list[Rows] = []
+            for k, turned in zip((i, j), angles, strict=True):
+                rows += [*[r.constant(len(knots)) for r in self.shape[k]], turned]
+            self._bind(knots, kernel, rows, parameters, {"clear": (least, np.inf)}, f"{kind}{c}_{d}")
+
         every = np.arange(self.knots)
-        self._bind(every, kernel, rows, parameters, {"clear": (CLEARANCE, np.inf)}, f"fingers_apart{c}_{d}")
+        bind("fingers_apart", every, [self.angles[k] for k in (i, j)], CLEARANCE)
+        # Else fingers may pass through each other from one knot to the next.
+        weights = structure.inner.weights(np.arange(len(structure.inner.share)))
+        bind("fingers_between", structure.inner.interval, [self.angles[k].combine(weights) for k in (i, j)], 0.0)
 
 
 def pushed_knots(model: Model) -> NDArray[np.int64]:

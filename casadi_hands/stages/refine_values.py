@@ -148,8 +148,9 @@ class RefineValues:
     def parameters(self, motion: WholeHand, margin: Margin, wanted: WholeHand | None = None) -> dict[str, ArrayLike]:
         """Values of all parameters but the weights; costs hold a motion near to the wanted one, by default itself."""
         model, wanted = self.model, wanted or motion
-        quaternion = continuous(motion.palm_quaternion)
-        middle = quaternion[1:] + quaternion[:-1]
+        inner = self.structure.inner
+        between = inner.weights(np.arange(len(inner.share)))
+        quaternion = between @ continuous(motion.palm_quaternion)
         values: dict[str, ArrayLike] = {
             "reference": model.reference,
             "gravity": model.gravity,
@@ -164,8 +165,8 @@ class RefineValues:
             "step": np.diff(model.schedule.samples)[:, None],
             "palm_position": motion.palm_position,
             "palm_quaternion": motion.palm_quaternion,
-            "palm_position_between": (motion.palm_position[1:] + motion.palm_position[:-1]) / 2,
-            "palm_quaternion_between": middle / np.linalg.norm(middle, axis=1, keepdims=True),
+            "palm_position_between": between @ motion.palm_position,
+            "palm_quaternion_between": quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True),
             "wanted_pose": np.hstack([wanted.position, wanted.vector]),
         }
         values |= self.anchors.idle

@@ -3,11 +3,47 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from casadi_hands.stages.model import Model
+
+APART = 0.1  # s, how far at most the times are apart at which a motion is looked at, at knots and between
+
+
+@dataclass(frozen=True)
+class Inner:
+    """Times between knots at which a motion on them is looked at, too, evenly spaced in each interval.
+
+    Attributes:
+        count: of the knots.
+        interval: (M,) the knot that each of these times comes after.
+        share: (M,) of the interval that has passed by then.
+    """
+
+    count: int
+    interval: NDArray[np.int64]
+    share: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, times: NDArray[np.float64]) -> Inner:
+        """One or more between knots at times (S,), s."""
+        counts = np.maximum(np.ceil(np.diff(times) / APART - 1e-9).astype(int) - 1, 1)
+        share = np.concatenate([(np.arange(n) + 1) / (n + 1) for n in counts])
+        return cls(len(times), np.repeat(np.arange(len(counts)), counts), share)
+
+    def within(self, intervals: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Indices of those in intervals with set flags (S - 1,)."""
+        return np.flatnonzero(intervals[self.interval])
+
+    def weights(self, chosen: NDArray[np.int64]) -> NDArray[np.float64]:
+        """(K, S) of the knots, that give what is linear from knot to knot at the chosen (K,) of these times."""
+        weights = np.zeros((len(chosen), self.count))
+        rows, knots, share = np.arange(len(chosen)), self.interval[chosen], self.share[chosen]
+        weights[rows, knots], weights[rows, knots + 1] = 1 - share, share
+        return weights
 
 
 @dataclass(frozen=True)
@@ -46,6 +82,11 @@ class Structure:
     def grounded(self) -> bool:
         """Whether the ground ever carries load."""
         return bool(self.active.shape[1] > len(self.contacts))
+
+    @cached_property
+    def inner(self) -> Inner:
+        """Times between knots."""
+        return Inner.of(self.model.schedule.samples)
 
     @property
     def touching(self) -> NDArray[np.bool_]:
