@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from casadi_hands.nlp import Options, Solution, Solver
 from casadi_hands.stages.model import Model
+from casadi_hands.stages.passing import pass_through
 from casadi_hands.stages.refine_problem import RefineProblem
 from casadi_hands.stages.refine_values import Margin, RefineValues
 from casadi_hands.stages.sampling import shortened
@@ -151,11 +153,27 @@ class RefineStage:
     """The stage for one structure: joints of each finger and when each contact, the ground's included, touches."""
 
     def __init__(
-        self, model: Model, contacts: tuple[int, ...], joints: tuple[int, ...], active: NDArray[np.bool_]
+        self,
+        model: Model,
+        contacts: tuple[int, ...],
+        joints: tuple[int, ...],
+        active: NDArray[np.bool_],
+        guarded: bool = False,
     ) -> None:
+        """Build the problem.
+
+        Args:
+            model: the task.
+            contacts: index of each finger's contact.
+            joints: of each finger.
+            active: (S, C) when each contact, the ground's included, touches.
+            guarded: whether fingers are kept clear of each other between knots from the start, and not only once they
+                were seen to pass through each other there: that takes twice as long.
+        """
         self.model, self.contacts = model, contacts
+        self._given = model, contacts, joints, active
         self.structure = Structure.of(model, contacts, joints, active)
-        self.built = RefineProblem(self.structure)
+        self.built = RefineProblem(self.structure, guarded)
         self.problem, self.given = self.built.problem, RefineValues(self.built, model)
         self.solver = Solver(self.problem)
 
@@ -169,6 +187,8 @@ class RefineStage:
     ) -> Refined:
         """Solve step by step; not to the end where firm solves show rolling to be out of reach.
 
+        Where fingers pass through each other between knots, all is solved again with them kept clear there, too.
+
         Args:
             way: solves, each from where the one before ended.
             start: the motion to begin with.
@@ -176,6 +196,19 @@ class RefineStage:
             share: of the way from the first goal to each of the others.
             wanted: the motion, of the same hand, that costs hold near to; by default that to begin with.
         """
+        refined = self._taken(way, start, margin, share, wanted)
+        if not refined.met or self.built.guarded or not pass_through(self.structure, refined.hand):
+            return refined
+        again = self._guarded.take(way, start, margin, share, wanted)
+        return replace(again, runs=refined.runs + again.runs)
+
+    @cached_property
+    def _guarded(self) -> RefineStage:
+        return RefineStage(*self._given, guarded=True)
+
+    def _taken(
+        self, way: tuple[Step, ...], start: WholeHand, margin: Margin, share: float, wanted: WholeHand | None
+    ) -> Refined:
         given = self.given if share == 1 else RefineValues(self.built, shortened(self.model, share))
         values, parameters = given.start(start), given.parameters(start, margin, wanted)
         lower, upper = given.bounds()

@@ -19,7 +19,7 @@ from casadi_hands.stages.synthesis import AXIS_RANGE
 
 JOINT_MARGIN = 0.005  # rad, so that a smooth curve through the knots stays within the limits between them
 _FREE = (-np.inf, np.inf)
-_PALM_BETWEEN = ("palm_position_between", "palm_quaternion_between")
+_PALM_BETWEEN = ("palm_position_between", "palm_quaternion_between")  # in the middle of intervals
 _HELD = {"pressing": (0.0, np.inf), "cone": (0.0, np.inf)}
 
 
@@ -28,6 +28,7 @@ class RefineProblem:
 
     Attributes:
         structure: it is built for.
+        guarded: whether fingers are kept clear of each other between knots, too.
         problem: its variables, parameters and blocks.
         knots: their number.
         pushed: those at which the task's perturbations act.
@@ -35,9 +36,9 @@ class RefineProblem:
         knots_of: for each block with constraints the knot of each of its instances; none where a block has no time.
     """
 
-    def __init__(self, structure: Structure) -> None:
+    def __init__(self, structure: Structure, guarded: bool = False) -> None:
         """Declare variables and parameters and bind every block."""
-        self.structure, self.problem = structure, Problem()
+        self.structure, self.guarded, self.problem = structure, guarded, Problem()
         self.knots_of: dict[str, NDArray[np.int64]] = {}
         model = structure.model
         self.knots = len(model.schedule.samples)
@@ -99,7 +100,7 @@ class RefineProblem:
         for name, width in (("palm_position", 3), ("palm_quaternion", 4), ("wanted_pose", 6)):
             problem.parameter(name, (count, width))
         for name, width in (("palm_position_between", 3), ("palm_quaternion_between", 4)):
-            problem.parameter(name, (len(structure.inner.share), width))
+            problem.parameter(name, (count - 1, width))
         for c in structure.columns:
             problem.parameter(f"capsule{c}", (1, 7))
             for name in ("wanted_point", "wanted_force"):
@@ -240,18 +241,17 @@ class RefineProblem:
         parameters += self._at((f"helper{c}", "step"), start)
         self._bind(start, finger.rolling(n), variables, parameters, {"no_slip": _FREE}, f"rolling{c}")
         # Else a finger may be stretched out between knots, or folded, and find itself there on more of them.
-        inner = structure.inner.within(structure.active[:-1, i])
-        weights, knots = structure.inner.weights(inner), structure.inner.interval[inner]
-        variables = [r.constant(len(inner)) for r in shape]
-        variables += [r.combine(weights) for r in (self.pose, point, angles, self.force.entries(*span))]
-        parameters = [*frames, *self._at(("reference", *_PALM_BETWEEN, f"capsule{c}", "radius"), inner)]
-        self._bind(knots, finger.supplied(n), variables, parameters, {"passive": _FREE}, f"between{c}")
+        halves = structure.middles.weights(start)
+        variables = [r.constant(len(start)) for r in shape]
+        variables += [r.combine(halves) for r in (self.pose, point, angles, self.force.entries(*span))]
+        parameters = [*frames, *self._at(("reference", *_PALM_BETWEEN, f"capsule{c}", "radius"), start)]
+        self._bind(start, finger.supplied(n), variables, parameters, {"passive": _FREE}, f"between{c}")
 
     def _bind_clearance(self, i: int) -> None:
         structure, model = self.structure, self.structure.model
         c, n = structure.contacts[i], structure.joints[i]
         touched = int(np.argmin(np.abs(model.primitives - model.capsules[c]).sum(axis=1)))
-        touching, idle = structure.touching[:, i], structure.inner.within(~structure.active[:-1, i])
+        touching, idle = structure.touching[:, i], np.flatnonzero(~structure.active[:-1, i])
 
         def bind(
             kind: str,
@@ -275,9 +275,9 @@ class RefineProblem:
                 rows = [self.pose.take(knots), self.angles[i].take(knots)]
                 bind(kind, knots, rows, scene(knots, "palm_position", "palm_quaternion"), CLEARANCE, skipped)
         if len(idle):  # a lifted finger is quick, and must not cut through the object's edge between two knots
-            weights, knots = structure.inner.weights(idle), structure.inner.interval[idle]
-            rows = [self.pose.combine(weights), self.angles[i].combine(weights)]
-            bind("apart_between", knots, rows, scene(idle, *_PALM_BETWEEN), 0.0, None)
+            halves = structure.middles.weights(idle)
+            rows = [self.pose.combine(halves), self.angles[i].combine(halves)]
+            bind("apart_between", idle, rows, scene(idle, *_PALM_BETWEEN), 0.0, None)
 
     def _bind_shape(self, i: int) -> None:
         """A finger's morphology, and its joints' motion: mirrored at both ends, so that it starts and ends at rest."""
@@ -311,9 +311,9 @@ class RefineProblem:
 
         every = np.arange(self.knots)
         bind("fingers_apart", every, [self.angles[k] for k in (i, j)], CLEARANCE)
-        # Else fingers may pass through each other from one knot to the next.
-        weights = structure.inner.weights(np.arange(len(structure.inner.share)))
-        bind("fingers_between", structure.inner.interval, [self.angles[k].combine(weights) for k in (i, j)], 0.0)
+        if self.guarded:
+            knots, weights = structure.between.interval, structure.between.weights()
+            bind("fingers_between", knots, [self.angles[k].combine(weights) for k in (i, j)], 0.0)
 
 
 def pushed_knots(model: Model) -> NDArray[np.int64]:

@@ -148,9 +148,8 @@ class RefineValues:
     def parameters(self, motion: WholeHand, margin: Margin, wanted: WholeHand | None = None) -> dict[str, ArrayLike]:
         """Values of all parameters but the weights; costs hold a motion near to the wanted one, by default itself."""
         model, wanted = self.model, wanted or motion
-        inner = self.structure.inner
-        between = inner.weights(np.arange(len(inner.share)))
-        quaternion = between @ continuous(motion.palm_quaternion)
+        halves = self.structure.middles.weights()
+        quaternion = halves @ continuous(motion.palm_quaternion)
         values: dict[str, ArrayLike] = {
             "reference": model.reference,
             "gravity": model.gravity,
@@ -165,7 +164,7 @@ class RefineValues:
             "step": np.diff(model.schedule.samples)[:, None],
             "palm_position": motion.palm_position,
             "palm_quaternion": motion.palm_quaternion,
-            "palm_position_between": between @ motion.palm_position,
+            "palm_position_between": halves @ motion.palm_position,
             "palm_quaternion_between": quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True),
             "wanted_pose": np.hstack([wanted.position, wanted.vector]),
         }

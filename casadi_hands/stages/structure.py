@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from casadi_hands.stages.model import Model
 
-APART = 0.1  # s, how far at most the times are apart at which a motion is looked at, at knots and between
+APART = 0.1  # s, how far at most the times are apart at which fingers are kept clear of each other
 
 
 @dataclass(frozen=True)
 class Inner:
-    """Times between knots at which a motion on them is looked at, too, evenly spaced in each interval.
+    """Times between knots at which a motion on them is looked at, too.
 
     Attributes:
         count: of the knots.
@@ -28,18 +28,14 @@ class Inner:
     share: NDArray[np.float64]
 
     @classmethod
-    def of(cls, times: NDArray[np.float64]) -> Inner:
-        """One or more between knots at times (S,), s."""
-        counts = np.maximum(np.ceil(np.diff(times) / APART - 1e-9).astype(int) - 1, 1)
-        share = np.concatenate([(np.arange(n) + 1) / (n + 1) for n in counts])
-        return cls(len(times), np.repeat(np.arange(len(counts)), counts), share)
+    def of(cls, numbers: NDArray[np.int64]) -> Inner:
+        """So many (S - 1,) in each interval, evenly spaced."""
+        shares = [(np.arange(n) + 1) / (n + 1) for n in numbers]
+        return cls(len(numbers) + 1, np.repeat(np.arange(len(numbers)), numbers), np.concatenate(shares))
 
-    def within(self, intervals: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """Indices of those in intervals with set flags (S - 1,)."""
-        return np.flatnonzero(intervals[self.interval])
-
-    def weights(self, chosen: NDArray[np.int64]) -> NDArray[np.float64]:
-        """(K, S) of the knots, that give what is linear from knot to knot at the chosen (K,) of these times."""
+    def weights(self, chosen: NDArray[np.int64] | None = None) -> NDArray[np.float64]:
+        """(K, S) of the knots, that give what is linear from knot to knot at all or the chosen (K,) of these times."""
+        chosen = np.arange(len(self.share)) if chosen is None else chosen
         weights = np.zeros((len(chosen), self.count))
         rows, knots, share = np.arange(len(chosen)), self.interval[chosen], self.share[chosen]
         weights[rows, knots], weights[rows, knots + 1] = 1 - share, share
@@ -84,9 +80,14 @@ class Structure:
         return bool(self.active.shape[1] > len(self.contacts))
 
     @cached_property
-    def inner(self) -> Inner:
-        """Times between knots."""
-        return Inner.of(self.model.schedule.samples)
+    def middles(self) -> Inner:
+        """The middle of each interval."""
+        return Inner.of(np.ones(len(self.model.schedule.samples) - 1, int))
+
+    @cached_property
+    def between(self) -> Inner:
+        """Times that are at most ``APART`` from the knots and from each other; none where knots are."""
+        return Inner.of(np.maximum(np.ceil(np.diff(self.model.schedule.samples) / APART - 1e-9).astype(int) - 1, 0))
 
     @property
     def touching(self) -> NDArray[np.bool_]:

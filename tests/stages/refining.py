@@ -23,9 +23,16 @@ class MadeUp:
         model: of a task.
         contacts: of the two fingers.
         lifted: for a contact, the ground's the last, from which sample to which it does not touch.
+        guarded: whether fingers are kept clear of each other between knots.
     """
 
-    def __init__(self, model: Model, contacts: tuple[int, int], lifted: Mapping[int, tuple[int, int]]) -> None:
+    def __init__(
+        self,
+        model: Model,
+        contacts: tuple[int, int],
+        lifted: Mapping[int, tuple[int, int]],
+        guarded: bool = False,
+    ) -> None:
         self.model, rng = model, np.random.default_rng(0)
         count = len(model.schedule.samples)
         patches, capsules = model.patches, model.capsules
@@ -47,7 +54,7 @@ class MadeUp:
             active=self.active,
             solution=made_up_solution({}),
         )
-        self.stage = RefineStage(model, contacts, (1, 2), self.active)
+        self.stage = RefineStage(model, contacts, (1, 2), self.active, guarded)
         self.values = {
             name: value + 0.05 * rng.normal(size=np.shape(value))
             for name, value in self.stage.given.start(self.start).items()

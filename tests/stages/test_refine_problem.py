@@ -146,93 +146,90 @@ def test_the_ground_is_where_it_is_while_it_bears_load(loaded: MadeUp) -> None:
     np.testing.assert_allclose(found["ground_held.pressing"].ravel(), expected, atol=1e-12)
 
 
-def test_times_between_knots_are_a_tenth_of_a_second_apart_at_most() -> None:
+def test_times_between_knots_divide_their_intervals_evenly() -> None:
     times = np.array([0, 0.1, 0.3, 0.7, 0.76])
-    inner = Inner.of(times)
-    np.testing.assert_allclose(inner.weights(np.arange(6)) @ times, [0.05, 0.2, 0.4, 0.5, 0.6, 0.73])
-    np.testing.assert_array_equal(inner.interval, [0, 1, 2, 2, 2, 3])
-    np.testing.assert_array_equal(inner.within(np.array([False, True, False, True])), [1, 5])
-    assert inner.weights(np.array([4, 1])).shape == (2, 5)
+    inner = Inner.of(np.array([0, 1, 3, 0]))
+    np.testing.assert_allclose(inner.weights() @ times, [0.2, 0.4, 0.5, 0.6])
+    np.testing.assert_allclose(inner.weights(np.array([3, 0])) @ times, [0.6, 0.2])
+    np.testing.assert_array_equal(inner.interval, [1, 2, 2, 2])
+    none = Inner.of(np.zeros(4, int))
+    assert none.weights().shape == (0, 5)
 
 
 @pytest.fixture(scope="module")
 def wide() -> MadeUp:
     """Fingers that lift for a while, on knots up to 0.3 s apart."""
     _, model = everything()
-    return MadeUp(resampled_model(model, model.schedule.stepped(0.3)), (0, 2), lifted={2: (2, 4)})
+    return MadeUp(resampled_model(model, model.schedule.stepped(0.3)), (0, 2), lifted={2: (2, 4)}, guarded=True)
 
 
-def halfway(made_up: MadeUp, intervals: Array) -> list[tuple[int, float]]:
-    """The interval of each time within some of them at which motions are looked at, and what has passed of it."""
-    steps = np.diff(made_up.model.schedule.samples)
-    numbers = {k: max(1, round(steps[k] / 0.1 + 0.49) - 1) for k in intervals}
-    return [(k, (n + 1) / (numbers[k] + 1)) for k in intervals for n in range(numbers[k])]
+def test_forces_are_supplied_in_the_middle_between_knots_too(loaded: MadeUp) -> None:
+    model, values, found = loaded.model, loaded.values, loaded.constraints(WEIGHTS)
+    palms = Rotation.from_quat(model.palm_quaternion, scalar_first=True)
+    turning = Slerp(np.arange(len(palms)), palms)
+    for i, c in enumerate((0, 2)):
+        finger = loaded.start.fingers[i]
+        intervals = np.flatnonzero(loaded.active[:-1, c])
+        assert len(found[f"between{c}.passive"]) == len(intervals)
+        for row, k in zip(found[f"between{c}.passive"], intervals, strict=True):
+            moving = (values["pose"], loaded.points[:, i], values[f"angles{c}"], loaded.forces[:, i])
+            middles = [(array[k] + array[k + 1]) / 2 for array in moving]
+            variables = {name: values[f"{name}{c}"] for name in ("base", "lengths", "axes")}
+            parameters = {
+                "frames": frames(finger),
+                "reference": model.reference,
+                "palm_position": (model.palm_position[k] + model.palm_position[k + 1]) / 2,
+                "palm_quaternion": turning(k + 0.5).as_quat(scalar_first=True),
+                "capsule": model.capsules[c],
+                "radius": model.link_radius,
+            }
+            variables |= dict(zip(("pose", "point", "angles", "force"), middles, strict=True))
+            expected = numbers(exact_fingers.supplied(finger.joints), variables, parameters)
+            np.testing.assert_allclose(row, expected["passive"], atol=1e-12)
 
 
-def test_forces_are_supplied_between_knots_too(loaded: MadeUp, wide: MadeUp) -> None:
-    for made_up in (loaded, wide):
-        model, values, found = made_up.model, made_up.values, made_up.constraints(WEIGHTS)
-        palms = Rotation.from_quat(model.palm_quaternion, scalar_first=True)
-        turning = Slerp(np.arange(len(palms)), palms)
-        for i, c in enumerate((0, 2)):
-            finger = made_up.start.fingers[i]
-            times = halfway(made_up, np.flatnonzero(made_up.active[:-1, c]))
-            assert len(found[f"between{c}.passive"]) == len(times)
-            for row, (k, share) in zip(found[f"between{c}.passive"], times, strict=True):
-                moving = (values["pose"], made_up.points[:, i], values[f"angles{c}"], made_up.forces[:, i])
-                there = [(1 - share) * array[k] + share * array[k + 1] for array in moving]
-                variables = {name: values[f"{name}{c}"] for name in ("base", "lengths", "axes")}
-                parameters = {
-                    "frames": frames(finger),
-                    "reference": model.reference,
-                    "palm_position": (1 - share) * model.palm_position[k] + share * model.palm_position[k + 1],
-                    "palm_quaternion": turning(k + share).as_quat(scalar_first=True),
-                    "capsule": model.capsules[c],
-                    "radius": model.link_radius,
-                }
-                variables |= dict(zip(("pose", "point", "angles", "force"), there, strict=True))
-                expected = numbers(exact_fingers.supplied(finger.joints), variables, parameters)
-                np.testing.assert_allclose(row, expected["passive"], atol=1e-4)
-    assert len(halfway(wide, np.array([0]))) > 1
+def test_lifted_fingers_are_clear_in_the_middle_between_knots_too(loaded: MadeUp) -> None:
+    model, values, found = loaded.model, loaded.values, loaded.constraints(WEIGHTS)
+    palms = Rotation.from_quat(model.palm_quaternion, scalar_first=True)
+    turning = Slerp(np.arange(len(palms)), palms)
+    intervals = np.flatnonzero(~loaded.active[:-1, 2])
+    assert len(found["apart_between2.clear"]) == len(intervals) > 0
+    kernel = exact_fingers.apart(2, len(model.primitives), None, model.ground is not None)
+    for row, k in zip(found["apart_between2.clear"], intervals, strict=True):
+        variables = {name: values[f"{name}2"] for name in ("base", "lengths", "axes")}
+        variables |= {
+            name: (values[of][k] + values[of][k + 1]) / 2 for name, of in (("pose", "pose"), ("angles", "angles2"))
+        }
+        parameters = {
+            "frames": frames(loaded.start.fingers[1]),
+            "reference": model.reference,
+            "palm_position": (model.palm_position[k] + model.palm_position[k + 1]) / 2,
+            "palm_quaternion": turning(k + 0.5).as_quat(scalar_first=True),
+            "radius": model.link_radius,
+            "palm_radius": model.palm_radius,
+            "ground": model.ground_height,
+            "primitives": model.primitives,
+        }
+        np.testing.assert_allclose(row, numbers(kernel, variables, parameters)["clear"], atol=1e-12)
 
 
-def test_bodies_are_kept_apart_between_knots_too(loaded: MadeUp, wide: MadeUp) -> None:
-    for made_up in (loaded, wide):
-        model, values, found = made_up.model, made_up.values, made_up.constraints(WEIGHTS)
-        palms = Rotation.from_quat(model.palm_quaternion, scalar_first=True)
-        turning = Slerp(np.arange(len(palms)), palms)
-        shapes = [{name: values[f"{name}{c}"] for name in ("base", "lengths", "axes")} for c in (0, 2)]
-
-        def at(name: str, k: int, share: float, values: dict[str, Array] = values) -> Array:
-            return (1 - share) * values[name][k] + share * values[name][k + 1]
-
-        times = halfway(made_up, np.arange(len(made_up.active) - 1))
-        assert len(found["fingers_between2_0.clear"]) == len(times)
-        for row, (k, share) in zip(found["fingers_between2_0.clear"], times, strict=True):
+def test_guarded_fingers_are_clear_of_each_other_every_tenth_of_a_second(loaded: MadeUp, wide: MadeUp) -> None:
+    assert not any("fingers_between" in name for name in loaded.stage.problem.constraint_rows)
+    values, found, times = wide.values, wide.constraints(WEIGHTS), wide.model.schedule.samples
+    rows = iter(found["fingers_between2_0.clear"])
+    for k, step in enumerate(np.diff(times)):
+        parts = next(n for n in range(1, 9) if step / n <= 0.1 + 1e-9)
+        assert parts > 1
+        for share in np.arange(1, parts) / parts:
             variables, parameters = {}, {}
             for tag, i, c in (("_a", 1, 2), ("_b", 0, 0)):
-                variables |= {f"{name}{tag}": value for name, value in shapes[i].items()}
-                variables |= {f"angles{tag}": at(f"angles{c}", k, share)}
-                parameters |= {f"frames{tag}": frames(made_up.start.fingers[i])}
-            parameters |= {"radius": model.link_radius}
+                variables |= {f"{name}{tag}": values[f"{name}{c}"] for name in ("base", "lengths", "axes")}
+                variables[f"angles{tag}"] = (1 - share) * values[f"angles{c}"][k] + share * values[f"angles{c}"][k + 1]
+                parameters[f"frames{tag}"] = frames(wide.start.fingers[i])
+            parameters["radius"] = wide.model.link_radius
             expected = numbers(exact_fingers.fingers_apart(2, 1), variables, parameters)
-            np.testing.assert_allclose(row, expected["clear"], atol=1e-12)
-        times = halfway(made_up, np.flatnonzero(~made_up.active[:-1, 2]))
-        assert len(found["apart_between2.clear"]) == len(times) > 0
-        for row, (k, share) in zip(found["apart_between2.clear"], times, strict=True):
-            variables = {**shapes[1], "pose": at("pose", k, share), "angles": at("angles2", k, share)}
-            parameters = {
-                "frames": frames(made_up.start.fingers[1]),
-                "reference": model.reference,
-                "palm_position": (1 - share) * model.palm_position[k] + share * model.palm_position[k + 1],
-                "palm_quaternion": turning(k + share).as_quat(scalar_first=True),
-                "radius": model.link_radius,
-                "palm_radius": model.palm_radius,
-                "ground": model.ground_height,
-                "primitives": model.primitives,
-            }
-            kernel = exact_fingers.apart(2, len(model.primitives), None, model.ground is not None)
-            np.testing.assert_allclose(row, numbers(kernel, variables, parameters)["clear"], atol=1e-4)
+            np.testing.assert_allclose(next(rows), expected["clear"], atol=1e-12)
+    assert next(rows, None) is None
 
 
 def test_contacts_that_touch_only_at_the_end_do_not_roll() -> None:

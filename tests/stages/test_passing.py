@@ -1,0 +1,86 @@
+"""Fingers that pass through each other between knots, told by coal."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from casadi_hands.stages import refine
+from casadi_hands.stages.passing import DEEP, pass_through
+from casadi_hands.stages.refine import LAST, RefineStage
+from casadi_hands.stages.refine_values import Margin
+from casadi_hands.stages.sampling import resampled_model
+from tests.stages.blocks import coal_distance, segment
+from tests.stages.example import PinFinger, everything
+from tests.stages.refining import MadeUp
+
+Array = np.ndarray
+
+
+@pytest.fixture(scope="module")
+def wide() -> MadeUp:
+    _, model = everything()
+    return MadeUp(resampled_model(model, model.schedule.stepped(0.3)), (0, 2), lifted={})
+
+
+def shallowest(made_up: MadeUp, angles: tuple[Array, Array]) -> float:
+    """Least distance of the two fingers' surfaces at times between knots, a tenth of a second apart or less."""
+    radius, least = made_up.model.link_radius, np.inf
+    fingers = [PinFinger(finger) for finger in made_up.start.fingers]
+    for k, step in enumerate(np.diff(made_up.model.schedule.samples)):
+        parts = next(n for n in range(1, 9) if step / n <= 0.1 + 1e-9)
+        for share in np.arange(1, parts) / parts:
+            links = [f.links((1 - share) * a[k] + share * a[k + 1]) for f, a in zip(fingers, angles, strict=True)]
+            for one in links[0]:
+                for other in links[1]:
+                    least = min(least, coal_distance(segment(*one, radius), segment(*other, radius)))
+    return float(least)
+
+
+def test_overlaps_between_knots_are_found_and_shallow_ones_are_not(wide: MadeUp) -> None:
+    structure, rng, found = wide.stage.structure, np.random.default_rng(0), set()
+    deep = -DEEP * wide.model.link_radius
+    for _ in range(30):
+        angles = tuple(rng.uniform(-1.2, 1.2, a.shape) for a in wide.start.angles)
+        least = shallowest(wide, angles)  # type: ignore[arg-type]
+        if abs(least - deep) > 1e-3:
+            passes = pass_through(structure, replace(wide.start, angles=angles))
+            assert passes == (least < deep)
+            found.add(passes)
+    assert found == {True, False}
+
+
+def test_knots_close_by_leave_no_room_to_pass_through() -> None:
+    made_up = MadeUp(everything()[1], (0, 2), lifted={})
+    assert np.diff(made_up.model.schedule.samples).max() <= 0.1 + 1e-9
+    same = replace(made_up.start, fingers=(made_up.start.fingers[1],) * 2, angles=(made_up.start.angles[1],) * 2)
+    assert not pass_through(made_up.stage.structure, same)
+
+
+@pytest.mark.parametrize("met", [True, False])
+@pytest.mark.parametrize("passes", [True, False])
+def test_what_passes_through_is_solved_again_with_guards(
+    wide: MadeUp, monkeypatch: pytest.MonkeyPatch, met: bool, passes: bool
+) -> None:
+    taken: list[bool] = []
+    monkeypatch.setattr(refine, "pass_through", lambda *_: passes)
+    solve = RefineStage._taken
+
+    def told(stage: RefineStage, *given: Any) -> Any:
+        taken.append(stage.built.guarded)
+        return replace(solve(stage, *given), met=met)
+
+    monkeypatch.setattr(RefineStage, "_taken", told)
+    short = (replace_iterations(LAST[0]),)
+    refined = wide.stage.take(short, wide.start, Margin())
+    assert taken == [False, True][: 2 if met and passes else 1]
+    assert len(refined.runs) == len(taken)
+
+
+def replace_iterations(step: Any) -> Any:
+    """The same step, with hardly any iterations."""
+    what, weights, options = step
+    return what, weights, replace(options, max_iter=1)
