@@ -133,7 +133,7 @@ class Continuation:
 
     def _on_few(self, way: tuple[Step, ...], start: WholeHand, margin: Margin) -> Refined:
         """A motion solved on few knots and made exact at the task's samples, near the same motion all the while."""
-        stage, found = self._found(lambda stage: stage.take(way, self._at(stage, start), margin))
+        stage, found = self._found(lambda stage: stage.take_clear(way, self._at(stage, start), margin))
         return self._denser(stage, found, start, margin, wanted=start)
 
     def _found(self, find: Callable[[RefineStage], Refined]) -> tuple[RefineStage, Refined]:

@@ -167,8 +167,7 @@ class RefineStage:
             contacts: index of each finger's contact.
             joints: of each finger.
             active: (S, C) when each contact, the ground's included, touches.
-            guarded: whether fingers are kept clear of each other between knots from the start, and not only once they
-                were seen to pass through each other there: that takes twice as long.
+            guarded: whether fingers are kept clear of each other between knots, too, which takes twice as long.
         """
         self.model, self.contacts = model, contacts
         self._given = model, contacts, joints, active
@@ -176,6 +175,18 @@ class RefineStage:
         self.built = RefineProblem(self.structure, guarded)
         self.problem, self.given = self.built.problem, RefineValues(self.built, model)
         self.solver = Solver(self.problem)
+
+    def take_clear(self, way: tuple[Step, ...], start: WholeHand, margin: Margin) -> Refined:
+        """``take``, and where fingers pass through each other between knots again, with them kept clear there, too."""
+        refined = self.take(way, start, margin)
+        if not refined.met or not pass_through(self.structure, refined.hand):
+            return refined
+        guarded = self._guarded.take(way, start, margin)
+        return replace(guarded, runs=refined.runs + guarded.runs)
+
+    @cached_property
+    def _guarded(self) -> RefineStage:
+        return RefineStage(*self._given, guarded=True)
 
     def take(
         self,
@@ -187,8 +198,6 @@ class RefineStage:
     ) -> Refined:
         """Solve step by step; not to the end where firm solves show rolling to be out of reach.
 
-        Where fingers pass through each other between knots, all is solved again with them kept clear there, too.
-
         Args:
             way: solves, each from where the one before ended.
             start: the motion to begin with.
@@ -196,19 +205,6 @@ class RefineStage:
             share: of the way from the first goal to each of the others.
             wanted: the motion, of the same hand, that costs hold near to; by default that to begin with.
         """
-        refined = self._taken(way, start, margin, share, wanted)
-        if not refined.met or self.built.guarded or not pass_through(self.structure, refined.hand):
-            return refined
-        again = self._guarded.take(way, start, margin, share, wanted)
-        return replace(again, runs=refined.runs + again.runs)
-
-    @cached_property
-    def _guarded(self) -> RefineStage:
-        return RefineStage(*self._given, guarded=True)
-
-    def _taken(
-        self, way: tuple[Step, ...], start: WholeHand, margin: Margin, share: float, wanted: WholeHand | None
-    ) -> Refined:
         given = self.given if share == 1 else RefineValues(self.built, shortened(self.model, share))
         values, parameters = given.start(start), given.parameters(start, margin, wanted)
         lower, upper = given.bounds()

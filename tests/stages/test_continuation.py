@@ -73,7 +73,9 @@ class Told(Continuation):
             barely = hopeless or level == self.firmer_on
             return Refined(result, exact, worst, {level: share}, hopeless, barely, runs, {}, margin, share)
 
-        return SimpleNamespace(model=model, take=take, costs=lambda *_: {"slip": 1.0, "passive_force": 0.0})
+        return SimpleNamespace(
+            model=model, take=take, take_clear=take, costs=lambda *_: {"slip": 1.0, "passive_force": 0.0}
+        )
 
     @property
     def ways(self) -> list[tuple[str, str]]:

@@ -67,15 +67,15 @@ def test_what_passes_through_is_solved_again_with_guards(
 ) -> None:
     taken: list[bool] = []
     monkeypatch.setattr(refine, "pass_through", lambda *_: passes)
-    solve = RefineStage._taken
+    solve = RefineStage.take
 
     def told(stage: RefineStage, *given: Any) -> Any:
         taken.append(stage.built.guarded)
         return replace(solve(stage, *given), met=met)
 
-    monkeypatch.setattr(RefineStage, "_taken", told)
+    monkeypatch.setattr(RefineStage, "take", told)
     short = (replace_iterations(LAST[0]),)
-    refined = wide.stage.take(short, wide.start, Margin())
+    refined = wide.stage.take_clear(short, wide.start, Margin())
     assert taken == [False, True][: 2 if met and passes else 1]
     assert len(refined.runs) == len(taken)
 
