@@ -213,9 +213,9 @@ def recorded_binds() -> Iterator[list[Bind]]:
     binds: list[Bind] = []
     original = Problem.bind
 
-    def bind(self: Problem, kernel: Kernel, variables: Any, parameters: Any = (), bounds: Any = None) -> None:
+    def bind(self: Problem, kernel: Kernel, variables: Any, parameters: Any = (), *rest: Any, **named: Any) -> None:
         binds.append(Bind(kernel, variables, parameters))
-        original(self, kernel, variables, parameters, bounds)
+        original(self, kernel, variables, parameters, *rest, **named)
 
     Problem.bind = bind  # type: ignore[method-assign]
     try:

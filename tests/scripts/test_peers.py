@@ -38,7 +38,8 @@ class Valley:
         point = problem.variable("point", (4, 1))
         problem.variable("unused", (1, 1), -1, 1)
         shift_at = problem.parameter("shift", (1, 1))
-        problem.bind(kernel, [point.take([0, 1, 2]), point.take([1, 2, 3])], [shift_at], {"sum": (-50.0, 0.5)})
+        rows = [point.take([0, 1, 2]), point.take([1, 2, 3])]
+        problem.bind(kernel, rows, [shift_at], {"sum": (-50.0, 0.5)}, "dale")
         self.solver = Solver(problem)
 
     def solve(self) -> None:
