@@ -51,9 +51,11 @@ def finger_scores(target: Target, hand: Synthesised) -> Array:
 
 def folding(target: Target, hand: Synthesised) -> int:
     """How many fingers pass a singular pose while they touch: those may well have no exact motion."""
-    placed = zip(hand.fingers, hand.contacts, strict=True)
-    jacobians = [(contact_kinematics(f, target.string_of(c), target.link_radius)[1], c) for f, c in placed]
-    return sum(folds(each, target.active[:, c]) for each, c in jacobians)
+    count = 0
+    for finger, contact in zip(hand.fingers, hand.contacts, strict=True):
+        _, jacobians = contact_kinematics(finger, target.string_of(contact), target.link_radius)
+        count += folds(jacobians, target.active[:, contact])
+    return count
 
 
 def worst_miss(target: Target, hand: Synthesised, contact: int) -> tuple[float, float]:

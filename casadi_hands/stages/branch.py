@@ -51,7 +51,9 @@ def folds(jacobians: Array, active: NDArray[np.bool_]) -> bool:
     return False
 
 
-def branches(model: Model, motion: WholeHand, finger: int, active: NDArray[np.bool_]) -> Array:
+def branches(
+    model: Model, motion: WholeHand, finger: int, active: NDArray[np.bool_], touching: NDArray[np.bool_]
+) -> Array:
     """What the regularity at each knot is to be multiplied with; at least ``REGULAR`` is asked of the result.
 
     Args:
@@ -59,6 +61,7 @@ def branches(model: Model, motion: WholeHand, finger: int, active: NDArray[np.bo
         motion: that tells the branches.
         finger: index of the finger among the motion's; of two or three joints.
         active: (S,) when its contact touches, held from its knot to the next.
+        touching: (S,) the same with the knot at which each touch ends.
 
     Returns:
         (S, size), one over the median where the motion is on its branch, zeros where none is to be kept.
@@ -66,7 +69,7 @@ def branches(model: Model, motion: WholeHand, finger: int, active: NDArray[np.bo
     jacobians = _jacobians(model, motion, finger)
     measured, most = _regularities(jacobians), _most(jacobians)
     result = np.zeros_like(measured)
-    for at in _touches(active, active | np.append(False, active[:-1])):
+    for at in _touches(active, touching):
         if np.median(np.linalg.norm(measured[at], axis=1)) > _SINGULAR * np.median(most[at]):
             result[at] = _kept(measured[at])
     return result

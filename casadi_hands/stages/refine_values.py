@@ -90,8 +90,10 @@ class RefineValues:
         bounds: Bounds = {}
         for i, (c, n) in enumerate(zip(structure.contacts, structure.joints, strict=True)):
             if n in SIZES:
-                parameters[f"branch{c}"] = branch = branches(self.model, motion, i, structure.active[:, i])
-                kept = np.abs(branch[structure.touching[:, i]]).sum(axis=1) > 0
+                touching = structure.touching[:, i]
+                branch = branches(self.model, motion, i, structure.active[:, i], touching)
+                parameters[f"branch{c}"] = branch
+                kept = np.abs(branch[touching]).sum(axis=1) > 0
                 bounds[f"contact{c}.regular"] = (np.where(kept, REGULAR, -np.inf)[:, None], np.inf)
         return parameters, bounds
 

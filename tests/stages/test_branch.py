@@ -60,7 +60,8 @@ def sides(elbow: Array, active: Array | None = None) -> tuple[Array, Array]:
     """The regularity of the motion at each knot on the branch that is kept, and its size."""
     hand, jacobians = bending(elbow)
     regularity = np.linalg.det(jacobians)[:, None] if elbow.ndim == 2 else np.cross(*jacobians.transpose(2, 0, 1))
-    branch = branches(MODEL, hand, 0, np.ones(COUNT, bool) if active is None else active)
+    active = np.ones(COUNT, bool) if active is None else active
+    branch = branches(MODEL, hand, 0, active, active | np.append(False, active[:-1]))
     assert branch.shape == regularity.shape
     return (branch * regularity).sum(axis=1), np.linalg.norm(regularity, axis=1)
 

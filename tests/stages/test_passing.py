@@ -74,13 +74,13 @@ def test_what_passes_through_is_solved_again_with_guards(
         return replace(solve(stage, *given), met=met)
 
     monkeypatch.setattr(RefineStage, "take", told)
-    short = (replace_iterations(LAST[0]),)
+    short = (briefly(LAST[0]),)
     refined = wide.stage.take_clear(short, wide.start, Margin())
     assert taken == [False, True][: 2 if met and passes else 1]
     assert len(refined.runs) == len(taken)
 
 
-def replace_iterations(step: Any) -> Any:
+def briefly(step: Any) -> Any:
     """The same step, with hardly any iterations."""
     what, weights, options = step
     return what, weights, replace(options, max_iter=1)
