@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from math import isfinite
 from typing import TYPE_CHECKING, Any
@@ -156,6 +157,7 @@ def _plain(value: Any) -> Any:
     return value
 
 
+@cache
 def _versions() -> dict[str, str]:
     """Versions of this package and of its numerical dependencies, of those installed."""
     found = {}

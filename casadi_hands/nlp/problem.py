@@ -153,7 +153,7 @@ class Problem:
         return list(dict.fromkeys(term for bound in self._bound for term in bound.kernel.terms))
 
     def functions(self) -> dict[str, Function]:
-        """Functions ``nlp`` (x, p) -> (f, g), ``grad_f``, ``jac_g``, ``hess_lag`` for nlpsol, and ``terms``."""
+        """For nlpsol ``nlp`` (x, p) -> (f, g), ``grad_f``, ``jac_g`` and ``hess_lag``; ``terms`` -> (f, g, terms)."""
         x, p = MX.sym("x", self.variables.size), MX.sym("p", self.parameters.size)
         scale, multipliers = MX.sym("lam_f"), MX.sym("lam_g", self.constraints.size)
         kernels = kernel_functions([bound.kernel for bound in self._bound])
@@ -182,7 +182,7 @@ class Problem:
                 ["x", "p", "lam_f", "lam_g"],
                 ["triu_hess_gamma_x_x"],
             ),
-            "terms": Function("terms", [x, p], [terms], ["x", "p"], ["terms"]),
+            "terms": Function("terms", [x, p], [f, g, terms], ["x", "p"], ["f", "g", "terms"]),
         }
 
     def _term_values(self, values: list[MX], p: MX) -> MX:

@@ -164,10 +164,11 @@ class Solver:
         started = time.perf_counter()
         answer = solver(x0=x0, p=p, lbx=lbx, ubx=ubx, lbg=lbg, ubg=ubg)
         seconds = time.perf_counter() - started
-        if solver.stats()["return_status"] == "NonIpopt_Exception_Thrown" or (watch and watch.interrupted):
+        stats = solver.stats()
+        if stats["return_status"] == "NonIpopt_Exception_Thrown" or (watch and watch.interrupted):
             # CasADi turns an interrupt into this status, or into an end that was asked for, and goes on.
             raise KeyboardInterrupt
-        return self._solution(answer, p, (lbg, ubg), solver.stats(), seconds)
+        return self._solution(answer, p, (lbg, ubg), stats, seconds)
 
     def evaluate(self, values: Mapping[str, ArrayLike], parameters: Mapping[str, ArrayLike]) -> dict[str, float]:
         """The weighted value of every term at given variables; those left out are zero.
@@ -180,7 +181,7 @@ class Solver:
             KeyError: as `solve`.
         """
         x = self.problem.variables.pack(values, np.zeros(self.problem.variables.size))
-        terms = np.asarray(self.functions["terms"](x, self._parameters(parameters))).reshape(-1)
+        terms = np.asarray(self.functions["terms"](x, self._parameters(parameters))[2]).reshape(-1)
         return dict(zip(self.problem.terms, terms.tolist(), strict=True))
 
     def _parameters(self, given: Mapping[str, ArrayLike]) -> Vector:
@@ -200,11 +201,10 @@ class Solver:
     ) -> Solution:
         problem, x = self.problem, np.asarray(answer["x"]).reshape(-1)
         # IPOPT's own f and g are left as they were where it stops before it evaluates them.
-        f, g = (np.asarray(value).reshape(-1) for value in self.functions["nlp"](x, p))
+        f, g, terms = (np.array(value).reshape(-1) for value in self.functions["terms"](x, p))
         finite = np.isfinite(g)
         low, high = (bound - np.where(finite, g, 0.0) for bound in bounds)
         beyond = np.where(finite, np.maximum(np.maximum(low, -high), 0.0), np.inf)
-        terms = np.asarray(self.functions["terms"](x, p)).reshape(-1)
         terms[~np.isfinite(terms)] = np.inf
         return Solution(
             values=problem.variables.unpack(x),

@@ -23,6 +23,7 @@ from casadi_hands.stages.model import Model, build_model, quaternion
 from casadi_hands.stages.refine_values import Margin, eased_in
 from casadi_hands.stages.synthesis import FingerSeed
 from casadi_hands.stages.whole_hand import WholeHand
+from casadi_hands.stages.whole_hand_numbers import in_palm
 from casadi_hands.task import Task
 
 Array = NDArray[np.float64]
@@ -226,7 +227,7 @@ def _followed(was: WholeHand, moved: WholeHand, on_link: Array, old: Model, mode
         old: of ``was``.
         model: of ``moved``.
     """
-    away = _in_palm(moved, model) - _in_palm(was, old)
+    away = _contacts(moved, model) - _contacts(was, old)
     fingers, angles = [], []
     for i, (finger, contact) in enumerate(zip(moved.fingers, moved.contacts, strict=True)):
         turned = np.array(
@@ -253,12 +254,9 @@ def _reach(finger: FingerSeed, angles: Array, on_link: Array, away: Array) -> Ar
     return turned
 
 
-def _in_palm(hand: WholeHand, model: Model) -> Array:
+def _contacts(hand: WholeHand, model: Model) -> Array:
     """Contact points (S, C, 3) in the palm's frame."""
-    turns = np.array([pin.exp3(v) @ _matrix(model.reference) for v in hand.vector])
-    palms = np.array([_matrix(q) for q in hand.palm_quaternion])
-    world = np.einsum("sij,scj->sci", turns, hand.point) + (hand.position - hand.palm_position)[:, None]
-    return np.asarray(np.einsum("sji,scj->sci", palms, world))
+    return np.stack([in_palm(model, hand, hand.point[:, c]) for c in range(hand.point.shape[1])], axis=1)
 
 
 def _vectors(rotations: Array) -> Array:

@@ -12,13 +12,12 @@ from collections.abc import Iterator
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 from casadi import SX
 from numpy.typing import NDArray
 
-from casadi_hands.kinematics import finger_kinematics
 from casadi_hands.stages.model import Model
 from casadi_hands.stages.whole_hand import WholeHand
+from casadi_hands.stages.whole_hand_numbers import contact_jacobians
 
 Array = NDArray[np.float64]
 SIZES = {2: 3, 3: 1}  # of the regularity, by number of joints; with others a finger has no branches, or may change them
@@ -66,7 +65,7 @@ def branches(
     Returns:
         (S, size), one over the median where the motion is on its branch, zeros where none is to be kept.
     """
-    jacobians = _jacobians(model, motion, finger)
+    jacobians = contact_jacobians(model, motion, finger)
     measured, most = _regularities(jacobians), _most(jacobians)
     result = np.zeros_like(measured)
     for at in _touches(active, touching):
@@ -108,25 +107,3 @@ def _regularities(jacobians: Array) -> Array:
     if jacobians.shape[2] == 3:
         return np.asarray(np.linalg.det(jacobians))[:, None]
     return np.asarray(np.cross(jacobians[:, :, 0], jacobians[:, :, 1]))
-
-
-def _jacobians(model: Model, motion: WholeHand, finger: int) -> Array:
-    """(S, 3, n) of a finger's contact on the object, palm frame, half extents/rad."""
-    own, angles = motion.fingers[finger], motion.angles[finger]
-    count, joints = angles.shape
-    given = (np.append(own.base, 0)[:, None], own.axis_vectors.T, own.lengths[:, None])
-    inputs = [np.tile(each, count) for each in given]
-    origins, rotations, *_ = finger_kinematics(joints).map(count)(*inputs, angles.T, np.zeros((3, count)))
-    origin = np.asarray(origins).T.reshape(count, joints, 3)
-    turned = np.asarray(rotations).T.reshape(count, joints, 3, 3)  # of each link's axes, one a row
-    axes = np.einsum("kjab,ja->kjb", turned, own.axis_vectors)
-    contact = _in_palm(model, motion, motion.point[:, motion.contacts[finger]])
-    return np.asarray(np.cross(axes, contact[:, None] - origin).transpose(0, 2, 1))
-
-
-def _in_palm(model: Model, motion: WholeHand, points: Array) -> Array:
-    """Points (S, 3) of the object's frame in the palm's, one a sample."""
-    reference = pin.Quaternion(*model.reference).matrix()
-    world = [p + pin.exp3(v) @ reference @ x for p, v, x in zip(motion.position, motion.vector, points, strict=True)]
-    palms = zip(world, motion.palm_position, motion.palm_quaternion, strict=True)
-    return np.array([pin.Quaternion(*q).matrix().T @ (x - p) for x, p, q in palms])

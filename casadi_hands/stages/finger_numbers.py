@@ -1,4 +1,4 @@
-"""A finger in numbers: where its contact is and what its joints can push."""
+"""A finger in numbers: where its links and its contact are and what its joints can push."""
 
 from __future__ import annotations
 
@@ -21,14 +21,27 @@ def contact_kinematics(finger: FingerSeed, strings: NDArray[np.int64], link_radi
         strings: (N,) the string of each keyframe.
         link_radius: half extents.
     """
-    function = finger_kinematics(finger.joints)
     # The same code serves CasADi's numbers; only its annotations speak of symbols.
     length, radius = ca.DM(finger.lengths[-1]), ca.DM(link_radius)
     on_link = [tip_point(ca.DM(tip), length, radius)[0] for tip in finger.tips]  # type: ignore[arg-type]
-    base, axes = np.append(finger.base, 0), finger.axis_vectors.T
-    points, jacobians = [], []
-    for angles, string in zip(finger.angles, strings, strict=True):
-        *_, point, jacobian = function(base, axes, finger.lengths, angles, on_link[string])
-        points.append(np.asarray(point).reshape(-1))
-        jacobians.append(np.asarray(jacobian))
-    return np.array(points), np.array(jacobians)
+    tips = np.asarray(ca.horzcat(*on_link))[:, strings]
+    *_, points, jacobians = _at(finger, finger.angles, tips)
+    count, joints = finger.angles.shape
+    slopes = np.asarray(jacobians).reshape(3, count, joints).transpose(1, 0, 2)
+    return np.ascontiguousarray(np.asarray(points).T), np.ascontiguousarray(slopes)
+
+
+def link_frames(finger: FingerSeed, angles: Array) -> tuple[Array, Array]:
+    """Origins (S, n, 3) and axes (S, n, 3, 3), one a column, of a finger's links at joint angles (S, n), palm frame."""
+    count, joints = angles.shape
+    origins, rotations, *_ = _at(finger, angles, np.zeros((3, count)))
+    turned = np.asarray(rotations).reshape(3, count, joints, 3).transpose(1, 2, 0, 3)
+    return np.ascontiguousarray(np.asarray(origins).T.reshape(count, joints, 3)), np.ascontiguousarray(turned)
+
+
+def _at(finger: FingerSeed, angles: Array, on_link: Array) -> tuple[ca.DM, ...]:
+    """What ``finger_kinematics`` gives, side by side, at angles (S, n) and points (3, S) of the last link."""
+    count, joints = angles.shape
+    given = (np.append(finger.base, 0)[:, None], finger.axis_vectors.T, finger.lengths[:, None])
+    inputs = [np.tile(each, count) for each in given]
+    return tuple(finger_kinematics(joints).map(count)(*inputs, angles.T, on_link))

@@ -4,20 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import casadi as ca
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from casadi_hands.design import Finger, Hand, Link, Motion
-from casadi_hands.kinematics import finger_kinematics
 from casadi_hands.motion import continuous
+from casadi_hands.stages.finger_numbers import link_frames
 from casadi_hands.stages.floating import Floating
 from casadi_hands.stages.grasp import on_capsules
 from casadi_hands.stages.model import Model, quaternion
 from casadi_hands.stages.object_side import sampled_points
 from casadi_hands.stages.synthesis import FingerSeed
 from casadi_hands.stages.whole_hand import WholeHand
+from casadi_hands.stages.whole_hand_numbers import (
+    contact_jacobians,
+    in_palm,
+    in_world,
+    object_rotation,
+    turned_to_palm,
+    turned_to_world,
+)
 from casadi_hands.task import Task
 
 Array = NDArray[np.float64]
@@ -105,18 +111,13 @@ def whole_hand_motion(model: Model, result: WholeHand) -> Motion:
     links = ["none"] * model.contacts + (["ground"] if model.ground is not None else [])
     for i, (finger, contact) in enumerate(zip(result.fingers, result.contacts, strict=True)):
         links[contact] = f"finger{i}_link{finger.joints - 1}"
-        function = finger_kinematics(finger.joints)
-        tip = np.array([[*np.zeros(3), 0, 0, finger.lengths[-1], model.link_radius]])
-        for s in range(count):
-            in_palm = _in_palm(model, result, s, point[s, contact])
-            base = np.append(finger.base, 0)
-            origins, rotations, *_ = function(
-                base, finger.axis_vectors.T, finger.lengths, result.angles[i][s], ca.DM.zeros(3)
-            )
-            local = np.asarray(rotations)[:, -3:].T @ (in_palm - np.asarray(origins)[:, -1])
-            on_link[s, contact] = on_capsules(local[None], tip)[0]
+        tip = np.array([*np.zeros(3), 0, 0, finger.lengths[-1], model.link_radius])
+        origins, rotations = link_frames(finger, result.angles[i])
+        from_origin = in_palm(model, result, point[:, contact]) - origins[:, -1]
+        local = np.einsum("sji,sj->si", rotations[:, -1], from_origin)
+        on_link[:, contact] = on_capsules(local, np.tile(tip, (count, 1)))
     if model.ground is not None:
-        on_link[:, -1] = _in_world(model, result, point[:, -1])
+        on_link[:, -1] = in_world(model, result, point[:, -1])
         on_link[:, -1, 2] = model.ground.height
     angles = np.hstack(result.angles) if result.angles else np.zeros((count, 0))
     joint_names = tuple(f"finger{i}_joint{j}" for i, f in enumerate(result.fingers) for j in range(f.joints))
@@ -125,23 +126,6 @@ def whole_hand_motion(model: Model, result: WholeHand) -> Motion:
     contacts = tuple(names[c] for c in touch), [links[c] for c in touch]
     active, force, point, on_link = result.active[:, touch], result.force[:, touch], point[:, touch], on_link[:, touch]
     return _motion(model, *object_pose, *palm, angles, joint_names, *contacts, active, force, point, on_link)
-
-
-def _rotation(model: Model, vector: Array) -> Array:
-    return np.asarray(pin.exp3(vector) @ pin.Quaternion(*model.reference).matrix())
-
-
-def _in_world(model: Model, result: WholeHand, points: Array) -> Array:
-    """Object points (S, 3) in the world."""
-    turns = np.array([_rotation(model, v) for v in result.vector])
-    return np.asarray(np.einsum("sij,sj->si", turns, points) + result.position)
-
-
-def _in_palm(model: Model, result: WholeHand, sample: int, point: Array) -> Array:
-    """An object point (3,) in the palm frame at a sample."""
-    world = _rotation(model, result.vector[sample]) @ point + result.position[sample]
-    palm = pin.Quaternion(*result.palm_quaternion[sample]).matrix()
-    return np.asarray(palm.T @ (world - result.palm_position[sample]))
 
 
 def _motion(
@@ -161,7 +145,7 @@ def _motion(
 ) -> Motion:
     """Dress nondimensional arrays as a ``Motion`` in SI, forces turned into the world."""
     units = model.units
-    rotations = np.array([_rotation(model, v) for v in vector])
+    rotations = np.array([object_rotation(model, v) for v in vector])
     scale = np.full(len(contact_names), units.length)
     return Motion(
         time=model.schedule.samples,
@@ -185,19 +169,10 @@ def _motion(
 def joint_loads(model: Model, result: WholeHand) -> tuple[float, float]:
     """Largest joint torque (N·m, from contact forces) and speed (rad/s) of a motion."""
     torque, speed = 0.0, 0.0
-    for i, (finger, contact) in enumerate(zip(result.fingers, result.contacts, strict=True)):
-        function = finger_kinematics(finger.joints)
-        times = model.schedule.samples
-        speed = max(speed, float(np.abs(np.diff(result.angles[i], axis=0) / np.diff(times)[:, None]).max()))
-        for s in range(len(times)):
-            palm = pin.Quaternion(*result.palm_quaternion[s]).matrix()
-            force = palm.T @ _rotation(model, result.vector[s]) @ result.force[s, contact]
-            base = np.append(finger.base, 0)
-            axes, lengths, angles = finger.axis_vectors.T, finger.lengths, result.angles[i][s]
-            origins, rotations, *_ = function(base, axes, lengths, angles, ca.DM.zeros(3))
-            local = np.asarray(rotations)[:, -3:].T @ (
-                _in_palm(model, result, s, result.point[s, contact]) - np.asarray(origins)[:, -1]
-            )
-            jacobian = np.asarray(function(base, axes, lengths, angles, local)[4])
-            torque = max(torque, float(np.abs(jacobian.T @ force).max()))
+    steps = np.diff(model.schedule.samples)[:, None]
+    for i, contact in enumerate(result.contacts):
+        speed = max(speed, float(np.abs(np.diff(result.angles[i], axis=0) / steps).max()))
+        force = turned_to_palm(result, turned_to_world(model, result, result.force[:, contact]))
+        torques = np.einsum("sij,si->sj", contact_jacobians(model, result, i), force)
+        torque = max(torque, float(np.abs(torques).max()))
     return torque * model.units.torque, speed
