@@ -58,7 +58,7 @@ _LIMITS = {  # by the constraint's kernel, without the finger's number, and name
     "contact.torque": _Limit(
         "supply its force within the torque limit", "torque", _TORQUE, ("torque", "unsupplied_force")
     ),
-    "between.passive": _Limit("supply its force with its joints", "force", _SIDE, ("unsupplied_force",)),
+    "midway.passive": _Limit("supply its force with its joints", "force", _SIDE, ("unsupplied_force",)),
     "ground_held.pressing": _Limit("stay pressed on the ground under the perturbation", "force", _PUSHED, ()),
     "ground_held.cone": _Limit("stand on the ground without slipping under the perturbation", "", _PUSHED, ()),
     "held.pressing": _Limit("keep pressing under the perturbation", "force", _PUSHED, ()),

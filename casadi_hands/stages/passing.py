@@ -20,7 +20,7 @@ def pass_through(structure: Structure, hand: WholeHand) -> bool:
         structure: of the fingers; its knots are those of the motion.
         hand: the motion.
     """
-    weights, radius = structure.between.weights(), structure.model.link_radius
+    weights, radius = structure.inner.weights(), structure.model.link_radius
     if not len(weights):
         return False
     shapes = [np.concatenate([f.base, f.lengths, f.axes.reshape(-1)]) for f in hand.fingers]

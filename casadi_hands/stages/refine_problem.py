@@ -245,7 +245,7 @@ class RefineProblem:
         variables = [r.constant(len(start)) for r in shape]
         variables += [r.combine(halves) for r in (self.pose, point, angles, self.force.entries(*span))]
         parameters = [*frames, *self._at(("reference", *_PALM_BETWEEN, f"capsule{c}", "radius"), start)]
-        self._bind(start, finger.supplied(n), variables, parameters, {"passive": _FREE}, f"between{c}")
+        self._bind(start, finger.supplied(n), variables, parameters, {"passive": _FREE}, f"midway{c}")
 
     def _bind_clearance(self, i: int) -> None:
         structure, model = self.structure, self.structure.model
@@ -312,7 +312,7 @@ class RefineProblem:
         every = np.arange(self.knots)
         bind("fingers_apart", every, [self.angles[k] for k in (i, j)], CLEARANCE)
         if self.guarded:
-            knots, weights = structure.between.interval, structure.between.weights()
+            knots, weights = structure.inner.interval, structure.inner.weights()
             bind("fingers_between", knots, [self.angles[k].combine(weights) for k in (i, j)], 0.0)
 
 

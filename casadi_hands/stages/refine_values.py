@@ -71,7 +71,7 @@ class RefineValues:
             exact[f"contact{c}.on_link"] = (-model.gap_tolerance, model.gap_tolerance)
             slip = self._slip_allowed(i)
             exact[f"rolling{c}.no_slip"] = (-slip, slip)
-            for kernel, factor in (("contact", 1.0), ("held", 1.0), ("between", ROUGHLY)):
+            for kernel, factor in (("contact", 1.0), ("held", 1.0), ("midway", ROUGHLY)):
                 if f"{kernel}{c}.passive" in self.problem.constraint_rows:
                     exact[f"{kernel}{c}.passive"] = (-factor * margin.passive, factor * margin.passive)
         if structure.grounded:

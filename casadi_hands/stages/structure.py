@@ -85,7 +85,7 @@ class Structure:
         return Inner.of(np.ones(len(self.model.schedule.samples) - 1, int))
 
     @cached_property
-    def between(self) -> Inner:
+    def inner(self) -> Inner:
         """Times that are at most ``APART`` from the knots and from each other; none where knots are."""
         return Inner.of(np.maximum(np.ceil(np.diff(self.model.schedule.samples) / APART - 1e-9).astype(int) - 1, 0))
 

@@ -112,7 +112,7 @@ def test_margins_are_bounds_of_contacts_while_they_bear(made_up: MadeUp) -> None
     for c in (0, 2):
         for kernel in ("contact", "held"):
             assert exact[f"{kernel}{c}.passive"] == (-0.02, 0.02)
-        assert exact[f"between{c}.passive"] == pytest.approx((-0.2, 0.2))
+        assert exact[f"midway{c}.passive"] == pytest.approx((-0.2, 0.2))
     # None of them is the name of nothing.
     assert {*always, *exact} <= set(made_up.stage.problem.constraint_rows)
 

@@ -170,8 +170,8 @@ def test_forces_are_supplied_in_the_middle_between_knots_too(loaded: MadeUp) -> 
     for i, c in enumerate((0, 2)):
         finger = loaded.start.fingers[i]
         intervals = np.flatnonzero(loaded.active[:-1, c])
-        assert len(found[f"between{c}.passive"]) == len(intervals)
-        for row, k in zip(found[f"between{c}.passive"], intervals, strict=True):
+        assert len(found[f"midway{c}.passive"]) == len(intervals)
+        for row, k in zip(found[f"midway{c}.passive"], intervals, strict=True):
             moving = (values["pose"], loaded.points[:, i], values[f"angles{c}"], loaded.forces[:, i])
             middles = [(array[k] + array[k + 1]) / 2 for array in moving]
             variables = {name: values[f"{name}{c}"] for name in ("base", "lengths", "axes")}
