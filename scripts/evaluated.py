@@ -88,7 +88,11 @@ def _loops(
     for bound, kernel in zip(problem._bound, kernels, strict=True):
         if (role == "hessian" and not kernel.hessian_pattern.nnz()) or (role == "jacobian" and not _rows(kernel)):
             continue
-        inputs = [bound.selector @ x, p[bound.parameters].reshape(-1), np.tile(p[bound.weights], bound.count)]
+        inputs = [
+            bound.selector @ x + bound.constant,
+            p[bound.parameters].reshape(-1),
+            np.tile(p[bound.weights], bound.count),
+        ]
         if role == "hessian":
             count = _rows(kernel) * bound.count
             inputs += [np.ones(bound.count), multipliers[bound.first_row : bound.first_row + count]]

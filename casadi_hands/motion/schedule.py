@@ -68,6 +68,12 @@ class Schedule:
         """Index (S,) of the keyframe whose contact flags hold at each sample."""
         return held(self.keyframes, self.samples)
 
+    def at(self, offset: float = 0.0) -> NDArray[np.float64]:
+        """Times (S,) ``offset`` steps after the samples, mirrored at the ends as splines are, s."""
+        first, last = self.keyframes[0], self.keyframes[-1]
+        times = first + np.abs(self.samples + offset * self.step - first)
+        return np.asarray(last - np.abs(last - times))
+
     def spline(self, offset: float = 0.0, resting: ArrayLike = ()) -> Weights:
         """Catmull–Rom weights (S, N) at the samples, ``offset`` steps later, at rest at the keyframes ``resting``."""
         return catmull_rom(self.keyframes, self.samples + offset * self.step, resting)

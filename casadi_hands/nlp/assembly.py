@@ -1,9 +1,9 @@
 """Partially separable assembly: each kernel's exact derivatives, mapped over its instances and scattered.
 
-With x_k = S_k x the local variables of instance k, the gradient is the sum of S_kᵀ g_k and the Hessian the sum
-of S_kᵀ H_k S_k. S_k is constant and many of its rows stand in several: z has each once, with S_k x a selection of z and
-z = Z x. What all instances add to z is summed first; each nonzero by x is then a fixed linear combination of those by
-z: one sparse matrix-vector product.
+With x_k = S_k x + s_k the local variables of instance k, the gradient is the sum of S_kᵀ g_k and the Hessian the sum
+of S_kᵀ H_k S_k. S_k is constant and many of its rows stand in several: z has each once, with x_k a selection of z and
+z = Z x + c. What all instances add to z is summed first; each nonzero by x is then a fixed linear combination of those
+by z: one sparse matrix-vector product.
 """
 
 from __future__ import annotations
@@ -122,7 +122,7 @@ def _nonzeros(matrix: SX) -> SX:
 
 
 class Reads:
-    """What kernels read: z = (x, the other linear expressions of x that any of them reads, each once).
+    """What kernels read: z = (x, the other affine expressions of x that any of them reads, each once).
 
     Kernels that read the same expressions share its entries, so that their derivatives are summed before they are
     spread over the variables.
@@ -132,21 +132,23 @@ class Reads:
         size: entries of z.
     """
 
-    def __init__(self, selectors: Sequence[sparse.csr_array], variables: int) -> None:
-        """Find the distinct rows of selectors (rows, variables)."""
+    def __init__(self, read: Sequence[tuple[sparse.csr_array, NDArray[np.float64]]], variables: int) -> None:
+        """Find the distinct rows of selectors (rows, variables), each with its constants (rows,)."""
+        selectors = [selector for selector, _ in read]
         rows = sparse.csr_array(sparse.vstack([sparse.csr_array((0, variables)), *selectors], format="csr"))
+        constants = np.concatenate([np.zeros(0), *[constant for _, constant in read]])
         rows.sum_duplicates()
         rows.eliminate_zeros()
         first, last = rows.indptr[:-1], rows.indptr[1:]
-        plain = last - first == 1
+        plain = (last - first == 1) & (constants == 0)
         plain[plain] = rows.data[first[plain]] == 1
         position = np.zeros(len(first), np.int64)
         position[plain] = rows.indices[first[plain]]
-        seen: dict[tuple[bytes, bytes], int] = {}
+        seen: dict[tuple[bytes, bytes, float], int] = {}
         others: list[int] = []
         for row in np.flatnonzero(~plain).tolist():
             entries = slice(first[row], last[row])
-            content = rows.indices[entries].tobytes(), rows.data[entries].tobytes()
+            content = rows.indices[entries].tobytes(), rows.data[entries].tobytes(), float(constants[row])
             if content not in seen:
                 seen[content] = variables + len(others)
                 others.append(row)
@@ -154,13 +156,16 @@ class Reads:
         self.positions: list[Indices] = np.split(position, np.cumsum([each.shape[0] for each in selectors])[:-1])
         self.size = variables + len(others)
         self._variables = variables
-        self._others = rows[others]
+        self._others, self._constants = rows[others], constants[others]
         # All rows of z by the variables, where they are not just these.
         self._rows = sparse.csr_array(sparse.vstack([sparse.eye_array(variables), self._others])) if others else None
 
     def of(self, x: MX) -> MX:
         """All that is read (size,), of the variables (nx,)."""
-        return x if self._rows is None else ca.vertcat(x, ca.mtimes(MX(to_dm(self._others)), x))
+        if self._rows is None:
+            return x
+        others = ca.mtimes(MX(to_dm(self._others)), x)
+        return ca.vertcat(x, others + DM(self._constants) if self._constants.any() else others)
 
     def gradient(self, slopes: MX) -> MX:
         """By the variables, from the gradients by what each kernel reads, one after the other."""

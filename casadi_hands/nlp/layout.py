@@ -1,4 +1,4 @@
-"""Where each named array stands in a long vector, and linear expressions of its entries."""
+"""Where each named array stands in a long vector, and affine expressions of its entries."""
 
 from __future__ import annotations
 
@@ -60,16 +60,17 @@ class Layout:
 
 
 class Rows:
-    """K rows of d linear expressions of the variables: what a kernel's instances read.
+    """K rows of d affine expressions of the variables: what a kernel's instances read.
 
     ``matrix`` has K·d rows and one column a variable (columns may be added later); row ``k*d + i`` is entry i of
-    instance k.
+    instance k. ``offset`` (K·d,) is added to what it gives.
     """
 
-    def __init__(self, matrix: Any, count: int, width: int) -> None:
-        """Take a matrix (count·width, variables) as it is."""
+    def __init__(self, matrix: Any, count: int, width: int, constant: Vector | None = None) -> None:
+        """Take a matrix (count·width, variables) as it is; nothing is added to it by default."""
         self.matrix = sparse.csr_array(matrix)
         self.count, self.width = count, width
+        self.offset: Vector = np.zeros(count * width) if constant is None else constant
 
     @classmethod
     def of(cls, indices: NDArray[np.int64], size: int) -> Rows:
@@ -82,18 +83,23 @@ class Rows:
         """Rows (T, d) that are the linear combinations ``weights`` (T, K) of these."""
         weights = np.asarray(weights, float)
         mixed = sparse.kron(sparse.csr_array(weights), sparse.eye_array(self.width)) @ self.matrix
-        return Rows(mixed, weights.shape[0], self.width)
+        constant = (weights @ self.offset.reshape(self.count, self.width)).reshape(-1)
+        return Rows(mixed, weights.shape[0], self.width, constant)
+
+    def plus(self, constant: Vector) -> Rows:
+        """The same with constants (K, d) added."""
+        return Rows(self.matrix, self.count, self.width, self.offset + constant.reshape(-1))
 
     def take(self, indices: ArrayLike) -> Rows:
         """The rows of the given instances, in that order, repeats allowed."""
         picked = np.asarray(indices, int)
         rows = (picked[:, None] * self.width + np.arange(self.width)).reshape(-1)
-        return Rows(self.matrix[rows], len(picked), self.width)
+        return Rows(self.matrix[rows], len(picked), self.width, self.offset[rows])
 
     def entries(self, start: int, stop: int) -> Rows:
         """Entries ``start`` to ``stop`` of every row."""
         rows = (np.arange(self.count)[:, None] * self.width + np.arange(start, stop)).reshape(-1)
-        return Rows(self.matrix[rows], self.count, stop - start)
+        return Rows(self.matrix[rows], self.count, stop - start, self.offset[rows])
 
     @classmethod
     def beside(cls, parts: Sequence[Rows]) -> Rows:
@@ -109,7 +115,8 @@ class Rows:
         indices, data = (np.concatenate([getattr(m, name) for m in matrices])[source] for name in ("indices", "data"))
         shape = len(lengths), max(matrix.shape[1] for matrix in matrices)
         joined = sparse.csr_array((data, indices, np.append(0, ends)), shape=shape)
-        return cls(joined, parts[0].count, sum(part.width for part in parts))
+        constant = np.hstack([p.offset.reshape(p.count, p.width) for p in parts]).reshape(-1)
+        return cls(joined, parts[0].count, sum(part.width for part in parts), constant)
 
     def constant(self, count: int) -> Rows:
         """One row repeated for ``count`` instances."""

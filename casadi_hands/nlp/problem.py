@@ -34,6 +34,7 @@ class _Bound:
     kernel: Kernel
     weights: NDArray[np.int64]
     selector: sparse.csr_array
+    constant: Vector
     parameters: NDArray[np.int64]
     count: int
     first_row: int
@@ -118,7 +119,8 @@ class Problem:
         self._constrain(name or kernel.name, kernel, count, bounds or {})
         if not count:
             return
-        selector = Rows.beside(variables).matrix
+        rows = Rows.beside(variables)
+        selector = rows.matrix
         selector.resize((selector.shape[0], self.variables.size))
         parts = [np.broadcast_to(p, (count, p.shape[1])) for p in parameters]
         positions = np.hstack(parts) if parts else np.zeros((count, 0), int)
@@ -127,7 +129,7 @@ class Problem:
             if f"weight.{term}" not in self.parameters:
                 self.parameters.add(f"weight.{term}", (1,))
         weights = np.array([self.parameters[f"weight.{term}"][0] for term in terms], int)
-        self._bound.append(_Bound(kernel, weights, selector, positions, count, first))
+        self._bound.append(_Bound(kernel, weights, selector, rows.offset, positions, count, first))
 
     def _constrain(
         self, block: str, kernel: Kernel, count: int, bounds: Mapping[str, tuple[ArrayLike, ArrayLike]]
@@ -157,7 +159,7 @@ class Problem:
         x, p = MX.sym("x", self.variables.size), MX.sym("p", self.parameters.size)
         scale, multipliers = MX.sym("lam_f"), MX.sym("lam_g", self.constraints.size)
         kernels = kernel_functions([bound.kernel for bound in self._bound])
-        reads = Reads([bound.selector for bound in self._bound], self.variables.size)
+        reads = Reads([(bound.selector, bound.constant) for bound in self._bound], self.variables.size)
         z = reads.of(x)
         bindings = zip(self._bound, kernels, reads.positions, strict=True)
         mapped = [_Mapped(b, k, position, *_inputs(b, z[position.tolist()], p)) for b, k, position in bindings]

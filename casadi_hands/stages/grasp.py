@@ -11,6 +11,7 @@ from scipy.optimize import nnls
 
 from casadi_hands.geometry import nearest_on_axis
 from casadi_hands.stages.model import Model
+from casadi_hands.stages.palm_motion import poses_at
 
 Array = NDArray[np.float64]
 _PRELOAD = 1.0  # m·g, normal force of the first guess
@@ -77,7 +78,7 @@ def needed_wrenches(model: Model, pose: Array) -> Array:
     """
     schedule, inertial = model.schedule, model.units.inertial
     at = schedule.keyframe_samples
-    before, now, after = (schedule.spline(offset)[at] @ pose for offset in (-1, 0, 1))
+    before, now, after = (poses_at(model, pose, offset)[at] for offset in (-1, 0, 1))
     acceleration = (after - 2 * now + before)[:, :3] / schedule.step**2
     reference = pin.Quaternion(*model.reference).matrix()
     wrenches = []

@@ -75,6 +75,34 @@ class Regrasp:
 
 
 @dataclass(frozen=True)
+class PalmPath:
+    """The palm's motion as the task gives it: straight from waypoint to waypoint, at rest at each.
+
+    Attributes:
+        times: (W,) s.
+        positions: (W, 3) world.
+        rotations: (W, 3, 3) world from palm.
+    """
+
+    times: Array
+    positions: Array
+    rotations: Array
+
+    def at(self, times: Array) -> Array:
+        """Positions and quaternions [w, x, y, z] (T, 7) at times (T,) in s."""
+        if len(self.times) == 1:
+            return np.tile(np.append(self.positions[0], quaternion(self.rotations[0])), (len(times), 1))
+        weights = linear(self.times, eased(self.times, times))
+        turns = [pin.Quaternion(rotation) for rotation in self.rotations]
+        quaternions = []
+        for row in weights:
+            later = int(np.flatnonzero(row)[-1])
+            turned = turns[max(later - 1, 0)].slerp(float(row[later]), turns[later])
+            quaternions.append(quaternion(turned.matrix()))
+        return np.hstack([round_off(weights @ self.positions), quaternions])
+
+
+@dataclass(frozen=True)
 class Model:
     """Everything the stages need of a task, nondimensional; arrays are read only by agreement.
 
@@ -92,6 +120,7 @@ class Model:
         palm_radius: of the disc.
         palm_position: (S, 3) world, at the samples.
         palm_quaternion: (S, 4) world from palm, [w, x, y, z].
+        palm_path: where they come from.
         goal_positions: (G, 3) world; for a drawing the tool's targets.
         goal_vectors: (G, 3) rotation vectors from the reference orientation, world; zeros for a drawing.
         goal_tolerance: half extents and rad, what each coordinate may miss a goal by within the task's limits.
@@ -122,6 +151,7 @@ class Model:
     palm_radius: float
     palm_position: Array
     palm_quaternion: Array
+    palm_path: PalmPath
     goal_positions: Array
     goal_vectors: Array
     goal_tolerance: tuple[float, float]
@@ -222,7 +252,9 @@ def build_model(task: Task) -> Model:
     primitives = np.array([[*np.ravel(s.segment), s.radius] for s in task.object.shapes]) / length
     patches = np.array([finger.touches for finger in task.fingers.values()]) / length
     positions, vectors, reference = _goals(task)
-    palm_position, palm_quaternion = _palm(task, schedule)
+    times, places, turns = zip(*task.palm.waypoints, strict=True)
+    palm_path = PalmPath(np.array(times), round_off(np.array(places) / length), np.array(turns))
+    palm = palm_path.at(schedule.samples)
     forces, torques = _perturbations(task, schedule)
     ground = None
     if task.ground is not None:
@@ -244,8 +276,9 @@ def build_model(task: Task) -> Model:
         friction=task.friction,
         ground=ground,
         palm_radius=round_off(task.palm.radius / length),
-        palm_position=round_off(palm_position / length),
-        palm_quaternion=palm_quaternion,
+        palm_position=palm[:, :3],
+        palm_quaternion=palm[:, 3:],
+        palm_path=palm_path,
         goal_positions=round_off(positions / length),
         goal_vectors=vectors,
         goal_tolerance=(
@@ -288,21 +321,6 @@ def _goals(task: Task) -> tuple[Array, Array, Array]:
         return points, np.zeros((len(points), 3)), np.array([1.0, 0.0, 0.0, 0.0])
     positions = np.array([goal.position for goal in task.motion], float)
     return positions, task.goal_turns(), quaternion(task.motion[0].rotation.matrix)
-
-
-def _palm(task: Task, schedule: Schedule) -> tuple[Array, Array]:
-    """Palm positions (S, 3) in m and quaternions (S, 4) at the samples: straight between waypoints, at rest at each."""
-    times, positions, rotations = zip(*task.palm.waypoints, strict=True)
-    if len(times) == 1:
-        count = len(schedule.samples)
-        return np.tile(positions[0], (count, 1)), np.tile(quaternion(rotations[0]), (count, 1))
-    weights = linear(times, eased(times, schedule.samples))
-    quaternions = []
-    for row in weights:
-        later = int(np.flatnonzero(row)[-1])
-        start, end = (pin.Quaternion(np.asarray(rotations[i])) for i in (max(later - 1, 0), later))
-        quaternions.append(quaternion(start.slerp(float(row[later]), end).matrix()))
-    return weights @ np.array(positions), np.array(quaternions)
 
 
 def _perturbations(task: Task, schedule: Schedule) -> tuple[Array, Array]:

@@ -12,7 +12,7 @@ from casadi_hands.motion import eased, linear
 from casadi_hands.nlp import Problem, Rows
 from casadi_hands.stages import soft_object
 from casadi_hands.stages.model import Model
-from casadi_hands.stages.palm_motion import carried_by_palm, goals_seen_from_palm
+from casadi_hands.stages.palm_motion import added_to_spline, carried_along, carried_by_palm, goals_seen_from_palm
 
 Array = NDArray[np.float64]
 CLEARANCE = 0.02  # half extents, asked of object and palm, and in exact motions of all bodies that do not touch
@@ -67,9 +67,10 @@ def declare_object(problem: Problem, model: Model) -> ObjectSide:
     perturbed = None
     if model.perturbed:
         perturbed = problem.variable("force_perturbed", (samples, 3 * contacts), -MOST_FORCE, MOST_FORCE)
-    before, now, after = (schedule.spline(offset) for offset in (-1, 0, 1))
     return ObjectSide(
-        pose=(pose.combine(before), pose.combine(now), pose.combine(after)),
+        pose=tuple(  # type: ignore[arg-type]
+            pose.combine(schedule.spline(offset)).plus(added_to_spline(model, offset)) for offset in (-1, 0, 1)
+        ),
         point=tuple(_points(model, point, offset) for offset in (-1, 0, 1)),  # type: ignore[arg-type]
         force=force,
         perturbed=perturbed,
@@ -208,13 +209,8 @@ def straight_path(model: Model) -> Array:
 
 def carried_acceleration(model: Model) -> Array:
     """Acceleration (S, 3), lengths/s², at the samples, that the palm's motion gives an object it carries."""
-    count = len(model.schedule.samples)
-    if model.tool is not None:
-        return np.zeros((count, 3))
-    start = np.concatenate([model.goal_positions[0], model.goal_vectors[0]])
-    position = carried_by_palm(model, np.tile(start, (count, 1)), np.arange(count))[:, :3]
-    mirrored = np.vstack([position[1], position, position[-2]])  # as motions are at their ends
-    return np.diff(mirrored, 2, axis=0) / model.schedule.step**2
+    before, now, after = carried_along(model)[:, :, :3]
+    return np.asarray((after - 2 * now + before) / model.schedule.step**2)
 
 
 def pose_bounds(model: Model) -> tuple[Array, Array]:

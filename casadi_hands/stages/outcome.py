@@ -14,6 +14,7 @@ from casadi_hands.stages.floating import Floating
 from casadi_hands.stages.grasp import on_capsules
 from casadi_hands.stages.model import Model, quaternion
 from casadi_hands.stages.object_side import sampled_points
+from casadi_hands.stages.palm_motion import poses_at
 from casadi_hands.stages.synthesis import FingerSeed
 from casadi_hands.stages.whole_hand import WholeHand
 from casadi_hands.stages.whole_hand_numbers import (
@@ -86,8 +87,7 @@ def _triple(vector: Array) -> tuple[float, float, float]:
 def floating_motion(model: Model, floating: Floating) -> Motion:
     """The object's motion of stage 1, with no joints and every contact's link named ``none``."""
     schedule = model.schedule
-    spline = schedule.spline()
-    pose = spline @ floating.pose
+    pose = poses_at(model, floating.pose)
     count = len(schedule.samples)
     point = sampled_points(model, floating.point)
     active = floating.active[schedule.sample_keyframes]

@@ -34,26 +34,67 @@ def carried_by_palm(model: Model, poses: Array, samples: NDArray[np.int64]) -> A
     return _all_moved(model, poses, samples, back=False)
 
 
+def carried_along(model: Model) -> Array:
+    """What the palm carries from its first pose on: poses (3, S, 6) one step before, at and after the samples.
+
+    They are those of an object that stays, seen from the palm, where its motion starts; a drawing's stays in the world.
+    """
+    start = np.concatenate([model.goal_positions[0], model.goal_vectors[0]])
+    count = len(model.schedule.samples)
+    if model.tool is not None or _stands(model):
+        return np.tile(start, (3, count, 1))
+    first = model.palm_path.at(model.schedule.samples[:1])[0]
+    ways = [_since(first, model.palm_path.at(model.schedule.at(offset))) for offset in (-1, 0, 1)]
+    return np.array([[_moved(start, *gone, back=False) for gone in way] for way in ways])
+
+
+def added_to_spline(model: Model, offset: int) -> Array:
+    """What keyframe poses' spline lacks (S, 6), ``offset`` (-1, 0 or 1) steps later, to go along with the palm.
+
+    Nothing is added at keyframes, and nothing at all where the palm stands.
+    """
+    along, schedule = carried_along(model), model.schedule
+    if model.tool is not None or _stands(model):
+        return np.zeros_like(along[0])
+    return np.asarray(along[1 + offset] - schedule.spline(offset) @ along[1][schedule.keyframe_samples])
+
+
+def poses_at(model: Model, keyframes: Array, offset: int = 0) -> Array:
+    """Poses (S, 6) of the object, ``offset`` (-1, 0 or 1) steps after the samples, from those (N, 6) at the keyframes.
+
+    A spline as the palm sees it: what stays where it is on a palm that moves goes all its way with it.
+    """
+    return np.asarray(model.schedule.spline(offset) @ keyframes + added_to_spline(model, offset))
+
+
 def _all_moved(model: Model, poses: Array, samples: NDArray[np.int64], back: bool) -> Array:
     if _stands(model):
         return poses
-    return np.array([_moved(pose, *_since_start(model, k), back) for pose, k in zip(poses, samples, strict=True)])
+    palm = np.hstack([model.palm_position, model.palm_quaternion])
+    gone = _since(palm[0], palm)
+    return np.array([_moved(pose, *gone[int(k)], back) for pose, k in zip(poses, samples, strict=True)])
 
 
 def _stands(model: Model) -> bool:
     return not (np.ptp(model.palm_position, axis=0).any() or np.ptp(model.palm_quaternion, axis=0).any())
 
 
-def _since_start(model: Model, sample: int) -> tuple[Array, Array]:
-    """Rotation (3, 3) and translation (3,) of the palm from its first pose to that at a sample, world."""
-    turned, first = (pin.Quaternion(*model.palm_quaternion[k]).matrix() for k in (sample, 0))
-    rotation = turned @ first.T
-    return rotation, model.palm_position[sample] - rotation @ model.palm_position[0]
+def _since(first: Array, palm: Array) -> list[tuple[Array, Array, Array]]:
+    """How the palm has moved from its first pose (7,) to each of those (T, 7) that follow, world.
+
+    Rotation (3, 3), translation (3,), and the rotation's vector (3,), continuous from one to the next.
+    """
+    gone, turn = [], np.zeros(3)
+    for pose in palm:
+        rotation = pin.Quaternion(*pose[3:]).matrix() @ pin.Quaternion(*first[3:]).matrix().T
+        turn = nearest_exponential(rotation, turn)
+        gone.append((rotation, pose[:3] - rotation @ first[:3], turn))
+    return gone
 
 
-def _moved(pose: Array, rotation: Array, translation: Array, back: bool) -> Array:
+def _moved(pose: Array, rotation: Array, translation: Array, turn: Array, back: bool) -> Array:
     """A pose moved along, or back."""
-    position, vector, turn = pose[:3], pose[3:], pin.log3(rotation)
+    position, vector = pose[:3], pose[3:]
     if back:
         position, rotation, turn = rotation.T @ (position - translation), rotation.T, -turn
     else:

@@ -8,10 +8,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from casadi_hands.motion import catmull_rom
+from casadi_hands.motion import catmull_rom, linear
 from casadi_hands.stages.floating import Floating
 from casadi_hands.stages.grasp import inward_normals, on_capsules
 from casadi_hands.stages.model import Model, palm_from_world
+from casadi_hands.stages.palm_motion import added_to_spline
 
 Array = NDArray[np.float64]
 
@@ -85,7 +86,8 @@ class Target:
     def scene(self, times: Array) -> tuple[Array, Array, Array]:
         """The object's capsules (T, 7K), the ground's normal (T, 3) and its offset (T,) in the palm frame."""
         model = self.model
-        poses = catmull_rom(self.times, times) @ self.pose
+        added = linear(model.schedule.samples, times) @ added_to_spline(model, 0)
+        poses = catmull_rom(self.times, times) @ self.pose + added
         primitives, up, offset = [], [], []
         for time, pose in zip(times, poses, strict=True):
             rotation, position = palm_from_world(model, time)

@@ -25,6 +25,7 @@ from casadi_hands.stages.object_side import (
     sizes,
     term_weights,
 )
+from casadi_hands.stages.palm_motion import poses_at
 from casadi_hands.stages.synthesis import MARGIN, FingerSeed
 from casadi_hands.stages.target import string_of
 
@@ -180,7 +181,6 @@ class WholeHandStage:
 
     def _parameters(self, fingers: tuple[FingerSeed, ...]) -> dict[str, Array | float]:
         model = self.model
-        samples, step = model.schedule.samples, model.schedule.step
         values = object_parameters(model)
         values |= {
             "link_radius": model.link_radius,
@@ -190,10 +190,8 @@ class WholeHandStage:
             "all_primitives": model.primitives.reshape(1, -1),
             "ground_height": model.ground_height,
         }
-        # A tenth of a second is short beside a palm's motion: the sample before stands for the time before.
-        previous = np.clip(np.searchsorted(samples, samples - step - 1e-9), 0, None)
-        values |= {"palm_position_before": model.palm_position[previous]}
-        values |= {"palm_quaternion_before": model.palm_quaternion[previous]}
+        before = model.palm_path.at(model.schedule.at(-1))
+        values |= {"palm_position_before": before[:, :3], "palm_quaternion_before": before[:, 3:]}
         for c, finger in zip(self.contacts, fingers, strict=True):
             values[f"frames{c}"] = finger.frames.transpose(0, 2, 1).reshape(1, -1)
             values[f"base{c}"], values[f"lengths{c}"] = finger.base, finger.lengths
@@ -206,7 +204,7 @@ class WholeHandStage:
         model, values, schedule = self.model, solution.values, self.model.schedule
         contacts = sizes(model)[2]
         joined = schedule.spline()
-        pose = joined @ values["pose"]
+        pose = poses_at(model, values["pose"])
         moved = tuple(
             FingerSeed(f.base, f.lengths, f.frames, f.axes, values[f"angles{c}"], f.tips)
             for c, f in zip(self.contacts, fingers, strict=True)

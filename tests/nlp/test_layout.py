@@ -77,3 +77,21 @@ def test_rows_of_no_instance_keep_their_width() -> None:
     assert (none.count, none.width) == (0, 3)
     assert (none.entries(1, 3).count, none.entries(1, 3).width) == (0, 2)
     assert Rows.beside([none, none.entries(0, 1)]).width == 4
+
+
+def test_offsets_go_along_with_the_rows_they_are_added_to() -> None:
+    rng = np.random.default_rng(0)
+    x, weights, added = rng.normal(size=6), rng.normal(size=(4, 3)), rng.normal(size=(3, 2))
+    rows = Rows.of(np.arange(6).reshape(3, 2), 6).plus(added)
+
+    def values(of: Rows) -> np.ndarray:
+        return (of.matrix @ x + of.offset).reshape(of.count, of.width)
+
+    expected = x.reshape(3, 2) + added
+    np.testing.assert_allclose(values(rows), expected)
+    np.testing.assert_allclose(values(rows.plus(added)), expected + added)
+    np.testing.assert_allclose(values(rows.combine(weights)), weights @ expected)
+    np.testing.assert_allclose(values(rows.take([2, 0, 2])), expected[[2, 0, 2]])
+    np.testing.assert_allclose(values(rows.entries(1, 2)), expected[:, 1:])
+    np.testing.assert_allclose(values(Rows.beside([rows, rows.entries(0, 1)])), np.hstack([expected, expected[:, :1]]))
+    np.testing.assert_allclose(values(rows.constant(2)), expected[[0, 0]])

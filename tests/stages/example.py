@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pinocchio as pin
 from scipy.interpolate import BPoly, CubicHermiteSpline
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import Rotation, Slerp
 
 from casadi_hands.nlp import Solution, Solver
 from casadi_hands.stages.floating import Floating
@@ -223,9 +223,29 @@ class Motion:
     def at(self, steps: int) -> tuple[Array, list[Rotation]]:
         """Positions and orientations ``steps`` time steps after the samples."""
         schedule = self.model.schedule
-        poses = spline_at(schedule.keyframes, self.pose, schedule.samples + steps * schedule.step)
+        times = schedule.samples + steps * schedule.step
+        poses = spline_at(schedule.keyframes, self.pose, times)
+        if self.model.tool is None:
+            poses += self.along(times) - spline_at(schedule.keyframes, self.along(schedule.keyframes), times)
         reference = Rotation.from_quat(self.model.reference, scalar_first=True)
         return poses[:, :3], [Rotation.from_rotvec(v) * reference for v in poses[:, 3:]]
+
+    def palm(self, times: Array) -> tuple[Array, Rotation]:
+        """Positions (T, 3) and orientations of the palm as the task gives them; the ends mirror the motion."""
+        path, last = self.model.palm_path, self.model.schedule.keyframes[-1]
+        when = last - np.abs(last - np.abs(times))
+        if len(path.times) == 1:
+            return np.tile(path.positions[0], (len(when), 1)), Rotation.from_matrix(path.rotations[[0] * len(when)])
+        eased = resting_at(path.times, path.times[:, None], np.clip(when, 0, path.times[-1]))[:, 0]
+        turns = Slerp(path.times, Rotation.from_matrix(path.rotations))(eased)
+        return linear_at(path.times, path.positions, eased), turns
+
+    def along(self, times: Array) -> Array:
+        """Poses (T, 6) of what is fixed to the palm where the object is at first."""
+        first, (places, turns) = self.model.palm_path, self.palm(times)
+        turned = turns * Rotation.from_matrix(first.rotations[0]).inv()
+        position = places + turned.apply(self.model.goal_positions[0] - first.positions[0])
+        return np.hstack([position, (turned * Rotation.from_rotvec(self.model.goal_vectors[0])).as_rotvec()])
 
     @property
     def acceleration(self) -> Array:

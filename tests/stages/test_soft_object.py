@@ -89,10 +89,9 @@ class Witness:
         model = self.model
         if model.tool is not None:
             return np.zeros(3)
-        palm, places = rotations(model.palm_quaternion), model.palm_position
-        fixed = places + palm.apply(palm[0].inv().apply(model.goal_positions[0] - places[0]))
-        before, after = np.vstack([fixed[1], fixed[:-1]]), np.vstack([fixed[1:], fixed[-2]])
-        return (before - 2 * fixed + after) / self.schedule.step**2
+        step = self.schedule.step
+        before, fixed, after = (self.motion.along(self.schedule.samples + k * step)[:, :3] for k in (-1, 0, 1))
+        return (before - 2 * fixed + after) / step**2
 
     def straight(self) -> Array:
         """Goals joined by straight lines as the palm sees it; a drawing's object upright, and at rest at every goal."""

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.stages.target import string_of, target_of
-from tests.stages.example import everything, made_up_floating, project, spline_at
+from tests.stages.example import Motion, everything, made_up_floating, project
 from tests.stages.test_model import rotations
 
 
@@ -52,13 +52,12 @@ def test_scene_is_the_object_s_capsules_and_the_ground_s_plane_in_the_palm_frame
     target = target_of(model, floating)
     times = model.schedule.samples[::3]
     primitives, up, offset = target.scene(times)
-    poses = spline_at(model.schedule.keyframes, floating.pose, times)
-    for t, pose in enumerate(poses):
+    positions, turns = Motion(model, floating.pose).at(0)
+    for t in range(len(times)):
         palm, position = rotations(model.palm_quaternion[3 * t]), model.palm_position[3 * t]
-        turn = Rotation.from_rotvec(pose[3:]) * rotations(model.reference)
         for capsule, found in zip(model.primitives, primitives[t].reshape(-1, 7), strict=True):
             for end in (slice(0, 3), slice(3, 6)):
-                in_world = turn.apply(capsule[end]) + pose[:3]
+                in_world = turns[3 * t].apply(capsule[end]) + positions[3 * t]
                 np.testing.assert_allclose(found[end], palm.inv().apply(in_world - position), atol=1e-12)
             assert found[6] == capsule[6]
         on_ground = palm.inv().apply(np.array([0.4, -0.7, model.ground.height]) - position)

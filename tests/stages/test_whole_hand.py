@@ -30,7 +30,6 @@ from tests.stages.example import (
     torques,
     unsupplied,
 )
-from tests.stages.test_model import rotations
 from tests.stages.test_soft_object import ALL_TERMS, WEIGHT_OF
 from tests.stages.test_soft_object import Witness as ObjectWitness
 
@@ -61,13 +60,11 @@ class Witness(ObjectWitness):
         self.objects = [self.motion.at(0), self.motion.at(-1)]
 
     def palm_at(self, steps: int) -> tuple[Array, Rotation]:
-        """Given pose (for the time before: that of the sample before) with the offset of a palm that moves."""
-        samples, step = self.schedule.samples, self.schedule.step
-        index = np.array([int(np.flatnonzero(samples >= t + steps * step - 1e-9)[0]) for t in samples])
-        position = self.model.palm_position[index]
-        orientation = rotations(self.model.palm_quaternion[index])
+        """Given pose with the offset of a palm that moves."""
+        times = self.schedule.samples + steps * self.schedule.step
+        position, orientation = self.motion.palm(times)
         if "palm" in self.values:
-            offset = spline_at(self.schedule.keyframes, self.values["palm"], samples + steps * step)
+            offset = spline_at(self.schedule.keyframes, self.values["palm"], times)
             position, orientation = position + offset[:, :3], Rotation.from_rotvec(offset[:, 3:]) * orientation
         return position, orientation
 
