@@ -173,7 +173,7 @@ class Refiner:
         stage = Continuation(self.model, whole.contacts, tuple(f.joints for f in whole.fingers), whole.active)
         refined = self._refined(stage, whole, margin, near, share)
         judged, refined, stage = self._between(whole, refined, stage, short, planned)
-        if refined.exact and judged.status != "certified":
+        if refined.exact and judged.status != "certified" and not stage.passes_through(refined):
             # Where joints barely push, fingers may fold over in an instant: other forces take them another way.
             other, grip = (AMPLE, "looser") if refined.margin == FIRM else (FIRM, "firmer")
             regripped = self._regripped(whole, refined, stage, other, f"again with a {grip} grip: {judged.reason}")
@@ -195,7 +195,8 @@ class Refiner:
     ) -> tuple[Design, Refined, Continuation]:
         """Judge a refinement; where it is exact but between samples, halve intervals as long as that helps."""
         judged = self._judged(stage.model, refined, short, planned)
-        while refined.exact and judged.missed & BETWEEN:
+        # Fingers that pass through each other do so on any knots.
+        while refined.exact and judged.missed & BETWEEN and not stage.passes_through(refined):
             schedule = stage.model.schedule
             crowded = intervals_to_halve(self.judge.audited(judged), np.diff(schedule.samples))
             if not crowded.any():

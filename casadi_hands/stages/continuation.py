@@ -125,6 +125,10 @@ class Continuation:
                 return replace(tight, runs=found.runs)
         return self._denser(stage, found, start, margin)
 
+    def passes_through(self, refined: Refined) -> bool:
+        """Whether fingers of a motion at the task's samples pass through each other between these."""
+        return self.fine.passes_through(refined)
+
     def _gripped(self, exact: Refined, margin: Margin) -> WholeHand:
         """A motion with its fingers' forces as much larger as another margin asks for: a start that presses enough."""
         force = exact.hand.force.copy()
@@ -189,11 +193,11 @@ class Continuation:
             margin: to keep to the limits.
             wanted: the motion, at the task's samples, to stay near; by default what is found.
         """
-        wanted = wanted or resampled(found.hand, stage.model, self.model)
+        goal = wanted or resampled(found.hand, stage.model, self.model)
         for denser in (self.coarse, self.fine):
             if len(denser.model.schedule.samples) <= len(stage.model.schedule.samples):
                 continue
-            begun, near = self._at(denser, start), self._at(denser, wanted)
+            begun, near = self._at(denser, start), self._at(denser, goal)
             hand = replace(
                 resampled(found.hand, stage.model, denser.model),
                 palm_position=begun.palm_position,
@@ -204,7 +208,8 @@ class Continuation:
             found = replace(before, hand=hand)
             if not before.met:
                 continue
-            found, runs = denser.take(RENEWED, hand, margin, before.share, near), before.runs
+            take = denser.take if wanted is None else denser.take_clear
+            found, runs = take(RENEWED, hand, margin, before.share, near), before.runs
             if not found.met:
                 again = denser.take(SHORT_WAY, hand, margin, before.share, near)
                 better = again if again.misses_less_than(found) else found

@@ -176,13 +176,24 @@ class RefineStage:
         self.problem, self.given = self.built.problem, RefineValues(self.built, model)
         self.solver = Solver(self.problem)
 
-    def take_clear(self, way: tuple[Step, ...], start: WholeHand, margin: Margin) -> Refined:
+    def take_clear(
+        self,
+        way: tuple[Step, ...],
+        start: WholeHand,
+        margin: Margin,
+        share: float = 1.0,
+        wanted: WholeHand | None = None,
+    ) -> Refined:
         """``take``, and where fingers pass through each other between knots again, with them kept clear there, too."""
-        refined = self.take(way, start, margin)
-        if not refined.met or not pass_through(self.structure, refined.hand):
+        refined = self.take(way, start, margin, share, wanted)
+        if not refined.met or not self.passes_through(refined):
             return refined
-        guarded = self._guarded.take(way, start, margin)
+        guarded = self._guarded.take(way, start, margin, share, wanted)
         return replace(guarded, runs=refined.runs + guarded.runs)
+
+    def passes_through(self, refined: Refined) -> bool:
+        """Whether fingers of a motion on the stage's knots pass through each other between them."""
+        return pass_through(self.structure, refined.hand)
 
     @cached_property
     def _guarded(self) -> RefineStage:

@@ -86,8 +86,8 @@ class Structure:
 
     @cached_property
     def inner(self) -> Inner:
-        """Times that are at most ``APART`` from the knots and from each other; none where knots are."""
-        return Inner.of(np.maximum(np.ceil(np.diff(self.model.schedule.samples) / APART - 1e-9).astype(int) - 1, 0))
+        """The middle of each interval, or more times where these would be more than ``APART`` from the knots."""
+        return Inner.of(np.maximum(np.ceil(np.diff(self.model.schedule.samples) / APART - 1e-9).astype(int) - 1, 1))
 
     @property
     def touching(self) -> NDArray[np.bool_]:

@@ -211,9 +211,11 @@ def test_what_a_firmer_grip_changes_is_told_from_the_hand_before_any_refinement(
     ]
 
 
-@pytest.mark.parametrize(("missed", "again"), [("slip", 2), ("goal_angle", 0)])
+@pytest.mark.parametrize(
+    ("missed", "passes", "again"), [("slip", False, 2), ("goal_angle", False, 0), ("penetration", True, 0)]
+)
 def test_what_is_missed_only_between_samples_gets_more_of_them(
-    monkeypatch: pytest.MonkeyPatch, missed: str, again: int
+    monkeypatch: pytest.MonkeyPatch, missed: str, passes: bool, again: int
 ) -> None:
     model = build_model(ball_task())
     tried: list[Any] = []
@@ -232,6 +234,9 @@ def test_what_is_missed_only_between_samples_gets_more_of_them(
 
         def solve(self, start: Any, margin: Margin, near: bool) -> Any:
             return self.renew(start, margin)
+
+        def passes_through(self, refined: Any) -> bool:
+            return passes
 
     def judged(self: Refiner, model: Any, *_: Any) -> Design:
         fine = np.diff(model.schedule.samples)[0] < 0.03
@@ -269,7 +274,7 @@ class Ways:
     model, contacts, joints = None, (0, 1), (1, 1)
 
     def __init__(self, firm: bool) -> None:
-        self.firm = firm
+        self.firm, self.passes = firm, False
         self.asked: list[tuple[str, Margin]] = []
 
     def taken(self, name: str, margin: Margin) -> Any:
@@ -285,6 +290,9 @@ class Ways:
 
     def regrip(self, exact: Any, margin: Margin) -> Any:
         return self.taken("regrip", margin)
+
+    def passes_through(self, refined: Any) -> bool:
+        return self.passes
 
 
 def refine(
@@ -348,6 +356,13 @@ def test_where_the_audit_refuses_an_exact_motion_a_firmer_grip_is_judged(
     drops = [0] if second == "certified" else []
     assert refine(monkeypatch, ways, 1.0, ["feasible", second], drops) == (kept, 0)
     assert ways.asked == [("solve", AMPLE), ("regrip", FIRM)]
+
+
+def test_where_fingers_pass_through_each_other_no_other_grip_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    ways = Ways(firm=False)
+    ways.passes = True
+    assert refine(monkeypatch, ways, 1.0, ["feasible"], []) == (AMPLE, 0)
+    assert ways.asked == [("solve", AMPLE)]
 
 
 def test_intervals_that_use_up_a_limit_and_their_neighbours_are_halved() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -51,6 +52,7 @@ class Told(Continuation):
         super().__init__(MODEL, (0, 2), (1, 2), np.ones((len(MODEL.schedule.samples), MODEL.contacts + 1), bool))
         self.taken: list[tuple[str, str, float, float]] = []
         self.wanted: list[WholeHand] = []
+        self.cleared: list[bool] = []
         self.exact_where, self.hopeless, self.violation, self.firmer_on = exact, hopeless, violation, firmer_on
         self.sparse, self.coarse, self.fine = (self._stage(level) for level in LEVELS)  # type: ignore[misc]
 
@@ -58,8 +60,14 @@ class Told(Continuation):
         model = LEVELS[level]
 
         def take(
-            way: Any, hand: WholeHand, margin: Margin, share: float = 1.0, wanted: WholeHand | None = None
+            way: Any,
+            hand: WholeHand,
+            margin: Margin,
+            share: float = 1.0,
+            wanted: WholeHand | None = None,
+            clear: bool = False,
         ) -> Refined:
+            self.cleared.append(clear)
             wanted = wanted or hand
             assert len(hand.position) == len(wanted.position) == len(model.schedule.samples)
             self.wanted.append(wanted)
@@ -74,7 +82,10 @@ class Told(Continuation):
             return Refined(result, exact, worst, {level: share}, hopeless, barely, runs, {}, margin, share)
 
         return SimpleNamespace(
-            model=model, take=take, take_clear=take, costs=lambda *_: {"slip": 1.0, "passive_force": 0.0}
+            model=model,
+            take=take,
+            take_clear=partial(take, clear=True),
+            costs=lambda *_: {"slip": 1.0, "passive_force": 0.0},
         )
 
     @property
@@ -98,6 +109,7 @@ def test_a_motion_is_made_exact_on_ever_denser_knots(start: WholeHand) -> None:
     told = Told(lambda level, share, margin: True)
     refined = told.solve(start, Margin())
     assert told.ways == [("sparse", LONG), ("coarse", "exact"), ("fine", "exact")]
+    assert all(told.cleared)
     assert refined.exact
     assert [run.what for run in refined.runs] == [*(f"sparse {step[0]}" for step in LONG_WAY), "coarse exact", "exact"]
     assert len(refined.hand.position) == len(MODEL.schedule.samples)
