@@ -32,16 +32,23 @@ class Schedule:
     step: float
 
     @classmethod
-    def of(cls, goal_times: Sequence[float], duration: float, between: int, step: float) -> Schedule:
+    def of(
+        cls, goal_times: Sequence[float], duration: float, between: int, step: float, stops: Sequence[float] = ()
+    ) -> Schedule:
         """Put ``between`` keyframes between neighbouring goals and samples at most ``step`` seconds apart.
 
-        A motion that goes on after its last goal gets one more stretch of keyframes to its end.
+        A motion that goes on after its last goal gets one more stretch of keyframes to its end. Of the times ``stops``
+        those that are apart from all goals get a keyframe, too, which parts the stretch it is in.
         """
-        ends = list(goal_times) + ([duration] if duration > goal_times[-1] + 1e-9 else [])
+        ends = list(goal_times)
+        for time in sorted([*stops, duration]):
+            if min(abs(time - end) for end in ends) > 1e-9 and time < duration + 1e-9:
+                ends.append(time)
+        ends.sort()
         keyframes = [ends[0]]
         for start, end in itertools.pairwise(ends):
             keyframes += list(np.linspace(start, end, between + 2)[1:])
-        goals = tuple(i * (between + 1) for i in range(len(goal_times)))
+        goals = tuple(ends.index(time) * (between + 1) for time in goal_times)
         return cls(np.array(keyframes), _samples(keyframes, step), goals, step)
 
     def stepped(self, step: float) -> Schedule:

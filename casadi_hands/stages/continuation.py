@@ -19,7 +19,7 @@ from casadi_hands.motion import held
 from casadi_hands.stages.model import Model
 from casadi_hands.stages.refine import FIRM_SOLVE, LAST, LONG_WAY, RENEWED, SHORT_WAY, Refined, RefineStage, Run, Step
 from casadi_hands.stages.refine_values import Margin
-from casadi_hands.stages.sampling import at_rest, extrapolated, resampled, resampled_model
+from casadi_hands.stages.sampling import at_rest, extrapolated, on_palm, resampled, resampled_model
 from casadi_hands.stages.whole_hand import WholeHand
 
 SPARSE, COARSE = 0.4, 0.2  # s between knots, at most
@@ -198,12 +198,8 @@ class Continuation:
             if len(denser.model.schedule.samples) <= len(stage.model.schedule.samples):
                 continue
             begun, near = self._at(denser, start), self._at(denser, goal)
-            hand = replace(
-                resampled(found.hand, stage.model, denser.model),
-                palm_position=begun.palm_position,
-                palm_quaternion=begun.palm_quaternion,
-                active=begun.active,
-            )
+            closer = resampled(found.hand, stage.model, denser.model)
+            hand = replace(on_palm(closer, begun), active=begun.active)
             stage, before = denser, found
             found = replace(before, hand=hand)
             if not before.met:

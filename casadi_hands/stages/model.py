@@ -248,11 +248,12 @@ def build_model(task: Task) -> Model:
     acceleration = gravity_size if gravity_size > 0 else STANDARD_GRAVITY
     length = task.object.half_extent
     units = Units(length, task.object.mass * acceleration, acceleration)
-    schedule = Schedule.of([goal.at for goal in task.motion], task.duration, task.keyframes_between, task.time_step)
+    times, places, turns = zip(*task.palm.waypoints, strict=True)
+    goal_times = [goal.at for goal in task.motion]
+    schedule = Schedule.of(goal_times, task.duration, task.keyframes_between, task.time_step, times)
     primitives = np.array([[*np.ravel(s.segment), s.radius] for s in task.object.shapes]) / length
     patches = np.array([finger.touches for finger in task.fingers.values()]) / length
     positions, vectors, reference = _goals(task)
-    times, places, turns = zip(*task.palm.waypoints, strict=True)
     palm_path = PalmPath(np.array(times), round_off(np.array(places) / length), np.array(turns))
     palm = palm_path.at(schedule.samples)
     forces, torques = _perturbations(task, schedule)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
-from casadi_hands.motion import Schedule, catmull_rom, continuous, held, linear
+from casadi_hands.motion import Schedule, catmull_rom, continuous, held, linear, nearest_exponential
 from casadi_hands.stages.grasp import on_capsules
 from casadi_hands.stages.model import Model
 from casadi_hands.stages.palm_motion import carried_by_palm, goals_seen_from_palm
@@ -63,6 +64,22 @@ def resampled(hand: WholeHand, before: Model, after: Model) -> WholeHand:
         point=np.tensordot(between, hand.point, axes=1),
         force=np.tensordot(straight, hand.force, axes=1),
         active=hand.active[held(was, now)],
+    )
+
+
+def on_palm(hand: WholeHand, palm: WholeHand) -> WholeHand:
+    """A motion with the palm of another at the same samples: what the palm holds goes along."""
+    position, vector = hand.position.copy(), hand.vector.copy()
+    for k, (was, now) in enumerate(zip(hand.palm_quaternion, palm.palm_quaternion, strict=True)):
+        turn = pin.Quaternion(*now).matrix() @ pin.Quaternion(*was).matrix().T
+        position[k] = palm.palm_position[k] + turn @ (hand.position[k] - hand.palm_position[k])
+        vector[k] = nearest_exponential(turn @ pin.exp3(hand.vector[k]), hand.vector[k] + pin.log3(turn))
+    return replace(
+        hand,
+        position=position,
+        vector=vector,
+        palm_position=palm.palm_position,
+        palm_quaternion=palm.palm_quaternion,
     )
 
 
