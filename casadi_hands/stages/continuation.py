@@ -199,7 +199,7 @@ class Continuation:
                 continue
             begun, near = self._at(denser, start), self._at(denser, goal)
             closer = resampled(found.hand, stage.model, denser.model)
-            hand = replace(on_palm(closer, begun), active=begun.active)
+            hand = replace(on_palm(closer, begun.palm_position, begun.palm_quaternion), active=begun.active)
             stage, before = denser, found
             found = replace(before, hand=hand)
             if not before.met:

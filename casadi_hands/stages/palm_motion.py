@@ -10,6 +10,7 @@ from casadi_hands.motion import nearest_exponential
 from casadi_hands.stages.model import Model
 
 Array = NDArray[np.float64]
+_INSTANT = 1e-2  # steps, over which velocities are differences
 
 
 def goals_seen_from_palm(model: Model) -> Array:
@@ -39,13 +40,26 @@ def carried_along(model: Model) -> Array:
 
     They are those of an object that stays, seen from the palm, where its motion starts; a drawing's stays in the world.
     """
+    if model.tool is not None or stands(model):
+        start = np.concatenate([model.goal_positions[0], model.goal_vectors[0]])
+        return np.tile(start, (3, len(model.schedule.samples), 1))
+    return np.array([_along(model, model.schedule.at(offset)) for offset in (-1, 0, 1)])
+
+
+def carried_velocity(model: Model) -> Array:
+    """Velocity (S, 3), lengths/s, at the samples, of an object that stays on its palm; a drawing's has none."""
+    schedule = model.schedule
+    if model.tool is not None or stands(model):
+        return np.zeros((len(schedule.samples), 3))
+    before, after = (_along(model, schedule.at(share)) for share in (-_INSTANT, _INSTANT))
+    return np.asarray((after - before)[:, :3] / (2 * _INSTANT * schedule.step))
+
+
+def _along(model: Model, times: Array) -> Array:
+    """Poses (T, 6) of what stays where the object starts, as the palm sees it."""
     start = np.concatenate([model.goal_positions[0], model.goal_vectors[0]])
-    count = len(model.schedule.samples)
-    if model.tool is not None or _stands(model):
-        return np.tile(start, (3, count, 1))
     first = model.palm_path.at(model.schedule.samples[:1])[0]
-    ways = [_since(first, model.palm_path.at(model.schedule.at(offset))) for offset in (-1, 0, 1)]
-    return np.array([[_moved(start, *gone, back=False) for gone in way] for way in ways])
+    return np.array([_moved(start, *gone, back=False) for gone in _since(first, model.palm_path.at(times))])
 
 
 def added_to_spline(model: Model, offset: int) -> Array:
@@ -54,7 +68,7 @@ def added_to_spline(model: Model, offset: int) -> Array:
     Nothing is added at keyframes, and nothing at all where the palm stands.
     """
     along, schedule = carried_along(model), model.schedule
-    if model.tool is not None or _stands(model):
+    if model.tool is not None or stands(model):
         return np.zeros_like(along[0])
     return np.asarray(along[1 + offset] - schedule.spline(offset) @ along[1][schedule.keyframe_samples])
 
@@ -68,14 +82,15 @@ def poses_at(model: Model, keyframes: Array, offset: int = 0) -> Array:
 
 
 def _all_moved(model: Model, poses: Array, samples: NDArray[np.int64], back: bool) -> Array:
-    if _stands(model):
+    if stands(model):
         return poses
     palm = np.hstack([model.palm_position, model.palm_quaternion])
     gone = _since(palm[0], palm)
     return np.array([_moved(pose, *gone[int(k)], back) for pose, k in zip(poses, samples, strict=True)])
 
 
-def _stands(model: Model) -> bool:
+def stands(model: Model) -> bool:
+    """Whether the task leaves the palm where it is."""
     return not (np.ptp(model.palm_position, axis=0).any() or np.ptp(model.palm_quaternion, axis=0).any())
 
 

@@ -13,6 +13,7 @@ from casadi_hands.stages import exact_object as body
 from casadi_hands.stages.branch import SIZES
 from casadi_hands.stages.model import Model
 from casadi_hands.stages.object_side import CLEARANCE, GOAL_TOLERANCE, MOST_FORCE
+from casadi_hands.stages.palm_motion import carried_velocity
 from casadi_hands.stages.projection import Anchors
 from casadi_hands.stages.structure import Structure
 from casadi_hands.stages.synthesis import AXIS_RANGE
@@ -146,7 +147,8 @@ class RefineProblem:
         self._bind(now, body.physics(), [*states, *wrenches], common, {"defect": (0, 0)})
         self._bind(every, body.wrench(columns), [self.wrench, self.point, self.force], [], {"sum": (0, 0)})
         inner = np.arange(self.knots - 2)
-        rates = [self.rate.take(inner + k) for k in range(3)]
+        carried = np.hstack([carried_velocity(self.structure.model), np.zeros((self.knots, 3))])
+        rates = [self.rate.plus(-carried).take(inner + k) for k in range(3)]
         problem.bind(body.object_jerk(), rates, self._steps(inner, inner + 1))
         ends = np.array([0, self.knots - 1])
         still = [r.take(ends) for r in (self.pose, self.wrench)]

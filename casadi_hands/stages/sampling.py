@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from casadi_hands.motion import Schedule, catmull_rom, continuous, held, linear, nearest_exponential
 from casadi_hands.stages.grasp import on_capsules
 from casadi_hands.stages.model import Model
-from casadi_hands.stages.palm_motion import carried_by_palm, goals_seen_from_palm
+from casadi_hands.stages.model import quaternion as quaternion_of
+from casadi_hands.stages.palm_motion import carried_by_palm, goals_seen_from_palm, stands
 from casadi_hands.stages.whole_hand import WholeHand
 
 Array = NDArray[np.float64]
@@ -23,16 +24,16 @@ def resampled_model(model: Model, schedule: Schedule) -> Model:
     A perturbation lasts to the next of its own samples; of those that act before the next knot a knot has the largest.
     """
     was, now = model.schedule.samples, schedule.samples
-    between, first = catmull_rom(was, now), held(was, now)
+    first = held(was, now)
     end = np.append(np.searchsorted(was, now[1:] - 1e-9), len(was))
     size = np.linalg.norm(np.hstack([model.perturbation_force, model.perturbation_torque]), axis=1)
     largest = np.array([i + np.argmax(size[i : max(i + 1, j)]) for i, j in zip(first, end, strict=True)])
-    quaternion = between @ continuous(model.palm_quaternion)
+    palm = model.palm_path.at(now)
     return replace(
         model,
         schedule=schedule,
-        palm_position=between @ model.palm_position,
-        palm_quaternion=quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True),
+        palm_position=palm[:, :3],
+        palm_quaternion=palm[:, 3:],
         perturbation_force=model.perturbation_force[largest],
         perturbation_torque=model.perturbation_torque[largest],
     )
@@ -42,7 +43,8 @@ def resampled(hand: WholeHand, before: Model, after: Model) -> WholeHand:
     """A motion at the samples of the same task with others.
 
     All moves on smooth curves, but fingers on straight ones next to a touch or a lift: they turn abruptly there, and a
-    smooth curve would swing them through the object's surface.
+    smooth curve would swing them through the object's surface. On a palm that the task moves, curves are as it sees
+    them: it goes its own way, with what the hand adds to it.
     """
     was, now = before.schedule.samples, after.schedule.samples
     between, straight = catmull_rom(was, now), linear(was, now)
@@ -54,7 +56,7 @@ def resampled(hand: WholeHand, before: Model, after: Model) -> WholeHand:
         return np.asarray(np.where(abrupt[:, None], straight, between) @ angles)
 
     quaternion = between @ continuous(hand.palm_quaternion)
-    return replace(
+    smooth = replace(
         hand,
         angles=tuple(map(joints, hand.contacts, hand.angles)),
         palm_position=between @ hand.palm_position,
@@ -65,22 +67,29 @@ def resampled(hand: WholeHand, before: Model, after: Model) -> WholeHand:
         force=np.tensordot(straight, hand.force, axes=1),
         active=hand.active[held(was, now)],
     )
+    if stands(before):
+        return smooth
+    path, finer = before.palm_path.at(was), before.palm_path.at(now)
+    turns = zip(hand.palm_quaternion, path[:, 3:], strict=True)
+    added = np.array([pin.log3(_matrix(ours) @ _matrix(given).T) for ours, given in turns])
+    turned = zip(between @ added, finer[:, 3:], strict=True)
+    position = finer[:, :3] + between @ (hand.palm_position - path[:, :3])
+    return on_palm(smooth, position, np.array([quaternion_of(pin.exp3(v) @ _matrix(q)) for v, q in turned]))
 
 
-def on_palm(hand: WholeHand, palm: WholeHand) -> WholeHand:
-    """A motion with the palm of another at the same samples: what the palm holds goes along."""
+def on_palm(hand: WholeHand, palm_position: Array, palm_quaternion: Array) -> WholeHand:
+    """A motion whose palm goes another way, (S, 3) and (S, 4): what it holds goes along."""
     position, vector = hand.position.copy(), hand.vector.copy()
-    for k, (was, now) in enumerate(zip(hand.palm_quaternion, palm.palm_quaternion, strict=True)):
-        turn = pin.Quaternion(*now).matrix() @ pin.Quaternion(*was).matrix().T
-        position[k] = palm.palm_position[k] + turn @ (hand.position[k] - hand.palm_position[k])
+    for k, (was, now) in enumerate(zip(hand.palm_quaternion, palm_quaternion, strict=True)):
+        turn = _matrix(now) @ _matrix(was).T
+        position[k] = palm_position[k] + turn @ (hand.position[k] - hand.palm_position[k])
         vector[k] = nearest_exponential(turn @ pin.exp3(hand.vector[k]), hand.vector[k] + pin.log3(turn))
-    return replace(
-        hand,
-        position=position,
-        vector=vector,
-        palm_position=palm.palm_position,
-        palm_quaternion=palm.palm_quaternion,
-    )
+    palm = {"palm_position": palm_position, "palm_quaternion": palm_quaternion}
+    return replace(hand, position=position, vector=vector, **palm)  # type: ignore[arg-type]
+
+
+def _matrix(quaternion: Array) -> Array:
+    return np.asarray(pin.Quaternion(*quaternion).matrix())
 
 
 def shortened(model: Model, share: float) -> Model:
