@@ -32,6 +32,22 @@ def test_samples_increase_by_no_more_than_a_step_up_to_the_end(goals, duration, 
     assert schedule.step == step
 
 
+def test_stops_between_goals_part_their_stretches_and_others_change_nothing() -> None:
+    schedule = Schedule.of([0.0, 1.0, 3.0], 4.0, 1, 0.1, stops=[0.0, 0.4, 1.0, 3.5, 4.0])
+    np.testing.assert_allclose(schedule.keyframes, [0, 0.2, 0.4, 0.7, 1, 2, 3, 3.25, 3.5, 3.75, 4])
+    assert schedule.goals == (0, 4, 6)
+    plain = Schedule.of([0.0, 1.0, 3.0], 4.0, 1, 0.1)
+    again = Schedule.of([0.0, 1.0, 3.0], 4.0, 1, 0.1, stops=[0.0, 1.0, 3.0])
+    np.testing.assert_array_equal(again.samples, plain.samples)
+    assert again.goals == plain.goals
+
+
+def test_times_beside_the_samples_mirror_at_the_ends() -> None:
+    schedule = Schedule.of([0.0, 0.3], 0.3, 0, 0.1)
+    np.testing.assert_allclose(schedule.at(-1), [0.1, 0, 0.1, 0.2], atol=1e-12)
+    np.testing.assert_allclose(schedule.at(0.5), [0.05, 0.15, 0.25, 0.25], atol=1e-12)
+
+
 def test_no_sample_more_than_needed() -> None:
     # 0.3 / 0.1 is above 3 in floating point.
     schedule = Schedule.of([0.0, 0.6], 0.6, 1, 0.1)

@@ -34,7 +34,7 @@ palm:
   radius: {0.05 * s}
   position: [{0.01 * s}, {-0.02 * s}, {0.12 * s}]
   facing: [0.1, 0.2, -1]
-  motion: [{{at: 1.2, position: [{0.02 * s}, 0, {0.13 * s}], facing: [0, 0.4, -1]}}]
+  motion: [{{at: 1.5, position: [{0.02 * s}, 0, {0.13 * s}], facing: [0, 0.4, -1]}}]
 motion:
   - {{at: 0, position: [0, 0, {0.045 * s}], rotation: {{axis: [1, 0, 0], degrees: 20}}}}
   - {{at: 0.6, position: [{0.02 * s}, 0, {0.05 * s}], rotation: {{axis: [0, 1, 1], degrees: 70}}}}

@@ -141,7 +141,7 @@ def test_what_counts_is_the_way_seen_from_the_palm() -> None:
     along = turning(170, f"position: [0, 0, 0.3], facing: [1, 0, 0], motion: [{poses}]")
     pose = straight_path(still)
     assert planned_regrasp(still, pose) is not None
-    assert planned_regrasp(along, pose) is None
+    assert planned_regrasp(along, straight_path(along)) is None
     assert np.degrees(FARTHEST) == pytest.approx(100)
 
 
