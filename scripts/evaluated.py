@@ -89,7 +89,7 @@ def _loops(
         if (role == "hessian" and not kernel.hessian_pattern.nnz()) or (role == "jacobian" and not _rows(kernel)):
             continue
         inputs = [
-            bound.selector @ x + bound.constant,
+            bound.selector @ x + bound.offset,
             p[bound.parameters].reshape(-1),
             np.tile(p[bound.weights], bound.count),
         ]

@@ -133,14 +133,14 @@ class Reads:
     """
 
     def __init__(self, read: Sequence[tuple[sparse.csr_array, NDArray[np.float64]]], variables: int) -> None:
-        """Find the distinct rows of selectors (rows, variables), each with its constants (rows,)."""
+        """Find the distinct rows of selectors (rows, variables), each with what is added to it (rows,)."""
         selectors = [selector for selector, _ in read]
         rows = sparse.csr_array(sparse.vstack([sparse.csr_array((0, variables)), *selectors], format="csr"))
-        constants = np.concatenate([np.zeros(0), *[constant for _, constant in read]])
+        offsets = np.concatenate([np.zeros(0), *[offset for _, offset in read]])
         rows.sum_duplicates()
         rows.eliminate_zeros()
         first, last = rows.indptr[:-1], rows.indptr[1:]
-        plain = (last - first == 1) & (constants == 0)
+        plain = (last - first == 1) & (offsets == 0)
         plain[plain] = rows.data[first[plain]] == 1
         position = np.zeros(len(first), np.int64)
         position[plain] = rows.indices[first[plain]]
@@ -148,7 +148,7 @@ class Reads:
         others: list[int] = []
         for row in np.flatnonzero(~plain).tolist():
             entries = slice(first[row], last[row])
-            content = rows.indices[entries].tobytes(), rows.data[entries].tobytes(), float(constants[row])
+            content = rows.indices[entries].tobytes(), rows.data[entries].tobytes(), float(offsets[row])
             if content not in seen:
                 seen[content] = variables + len(others)
                 others.append(row)
@@ -156,7 +156,7 @@ class Reads:
         self.positions: list[Indices] = np.split(position, np.cumsum([each.shape[0] for each in selectors])[:-1])
         self.size = variables + len(others)
         self._variables = variables
-        self._others, self._constants = rows[others], constants[others]
+        self._others, self._offsets = rows[others], offsets[others]
         # All rows of z by the variables, where they are not just these.
         self._rows = sparse.csr_array(sparse.vstack([sparse.eye_array(variables), self._others])) if others else None
 
@@ -165,7 +165,7 @@ class Reads:
         if self._rows is None:
             return x
         others = ca.mtimes(MX(to_dm(self._others)), x)
-        return ca.vertcat(x, others + DM(self._constants) if self._constants.any() else others)
+        return ca.vertcat(x, others + DM(self._offsets) if self._offsets.any() else others)
 
     def gradient(self, slopes: MX) -> MX:
         """By the variables, from the gradients by what each kernel reads, one after the other."""

@@ -66,11 +66,11 @@ class Rows:
     instance k. ``offset`` (K·d,) is added to what it gives.
     """
 
-    def __init__(self, matrix: Any, count: int, width: int, constant: Vector | None = None) -> None:
+    def __init__(self, matrix: Any, count: int, width: int, offset: Vector | None = None) -> None:
         """Take a matrix (count·width, variables) as it is; nothing is added to it by default."""
         self.matrix = sparse.csr_array(matrix)
         self.count, self.width = count, width
-        self.offset: Vector = np.zeros(count * width) if constant is None else constant
+        self.offset: Vector = np.zeros(count * width) if offset is None else offset
 
     @classmethod
     def of(cls, indices: NDArray[np.int64], size: int) -> Rows:
@@ -83,12 +83,12 @@ class Rows:
         """Rows (T, d) that are the linear combinations ``weights`` (T, K) of these."""
         weights = np.asarray(weights, float)
         mixed = sparse.kron(sparse.csr_array(weights), sparse.eye_array(self.width)) @ self.matrix
-        constant = (weights @ self.offset.reshape(self.count, self.width)).reshape(-1)
-        return Rows(mixed, weights.shape[0], self.width, constant)
+        offset = (weights @ self.offset.reshape(self.count, self.width)).reshape(-1)
+        return Rows(mixed, weights.shape[0], self.width, offset)
 
-    def plus(self, constant: Vector) -> Rows:
+    def plus(self, offset: Vector) -> Rows:
         """The same with constants (K, d) added."""
-        return Rows(self.matrix, self.count, self.width, self.offset + constant.reshape(-1))
+        return Rows(self.matrix, self.count, self.width, self.offset + offset.reshape(-1))
 
     def take(self, indices: ArrayLike) -> Rows:
         """The rows of the given instances, in that order, repeats allowed."""
@@ -115,8 +115,8 @@ class Rows:
         indices, data = (np.concatenate([getattr(m, name) for m in matrices])[source] for name in ("indices", "data"))
         shape = len(lengths), max(matrix.shape[1] for matrix in matrices)
         joined = sparse.csr_array((data, indices, np.append(0, ends)), shape=shape)
-        constant = np.hstack([p.offset.reshape(p.count, p.width) for p in parts]).reshape(-1)
-        return cls(joined, parts[0].count, sum(part.width for part in parts), constant)
+        offset = np.hstack([p.offset.reshape(p.count, p.width) for p in parts]).reshape(-1)
+        return cls(joined, parts[0].count, sum(part.width for part in parts), offset)
 
     def constant(self, count: int) -> Rows:
         """One row repeated for ``count`` instances."""

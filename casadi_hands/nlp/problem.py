@@ -34,7 +34,7 @@ class _Bound:
     kernel: Kernel
     weights: NDArray[np.int64]
     selector: sparse.csr_array
-    constant: Vector
+    offset: Vector
     parameters: NDArray[np.int64]
     count: int
     first_row: int
@@ -159,7 +159,7 @@ class Problem:
         x, p = MX.sym("x", self.variables.size), MX.sym("p", self.parameters.size)
         scale, multipliers = MX.sym("lam_f"), MX.sym("lam_g", self.constraints.size)
         kernels = kernel_functions([bound.kernel for bound in self._bound])
-        reads = Reads([(bound.selector, bound.constant) for bound in self._bound], self.variables.size)
+        reads = Reads([(bound.selector, bound.offset) for bound in self._bound], self.variables.size)
         z = reads.of(x)
         bindings = zip(self._bound, kernels, reads.positions, strict=True)
         mapped = [_Mapped(b, k, position, *_inputs(b, z[position.tolist()], p)) for b, k, position in bindings]
