@@ -144,17 +144,23 @@ class Continuation:
         """A motion found on sparse knots, or on coarse ones where that fails, and the stage with these knots.
 
         Few knots may be too few for a quick motion, but where one on them obeys physics and still slips far, one on
-        more knots does, too.
+        more knots does, too. A hand that leaves the object one way to go at most is not worth a second try.
         """
         stage, found = self.sparse, self._named(self.sparse, find(self.sparse))
         surely_slips = found.slips_hopelessly and found.worst.violation <= FIRM_SOLVE.constr_viol_tol
-        if found.exact or surely_slips or self.coarse is self.sparse:
+        if found.exact or surely_slips or self.coarse is self.sparse or self._mobility < 2:
             return stage, found
         again = self._named(self.coarse, find(self.coarse))
         runs = found.runs + again.runs
         if again.misses_less_than(found):
             stage, found = self.coarse, again
         return stage, replace(found, runs=runs)
+
+    @property
+    def _mobility(self) -> int:
+        """How many ways object and joints can go at once while all fingers that touch roll, where fewest (Grübler)."""
+        touching = self.active[:, list(self.contacts)]
+        return int(6 + (touching @ (np.array(self.joints, int) - 3)).min())
 
     def _lengthened(self, start: WholeHand, share: float, margin: Margin, stage: RefineStage) -> Refined:
         """The longest motion found on the knots of a stage."""

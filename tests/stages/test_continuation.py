@@ -49,7 +49,8 @@ class Told(Continuation):
         violation: float = 0.0,
         firmer_on: str = "",
     ) -> None:
-        super().__init__(MODEL, (0, 2), (1, 2), np.ones((len(MODEL.schedule.samples), MODEL.contacts + 1), bool))
+        active = np.tile([True, False, True, False], (len(MODEL.schedule.samples), 1))
+        super().__init__(MODEL, (0, 2), (1, 2), active)
         self.taken: list[tuple[str, str, float, float]] = []
         self.wanted: list[WholeHand] = []
         self.cleared: list[bool] = []
@@ -137,6 +138,20 @@ def test_what_fails_on_sparse_knots_is_tried_on_coarse_but_not_on_dense_ones(sta
     assert len(refined.runs) == 2 * len(LONG_WAY)
     assert len(refined.hand.position) == len(MODEL.schedule.samples)
     np.testing.assert_array_equal(refined.hand.active, start.active)
+
+
+@pytest.mark.parametrize(
+    ("joints", "ground", "more"), [((1, 1), False, True), ((1, 2), True, False), ((3, 2), True, True)]
+)
+def test_hands_that_leave_the_object_one_way_to_go_are_not_tried_on_more_knots(
+    start: WholeHand, joints: tuple[int, int], ground: bool, more: bool
+) -> None:
+    # Two velocities are left of six and two joints' by two contacts that roll, none by the ground too; five joints more.
+    told = Told(lambda level, share, margin: False)
+    told.joints = joints
+    told.active[3, -1] = ground
+    told.solve(start, Margin())
+    assert told.ways == [("sparse", LONG), ("coarse", LONG)][: 1 + more]
 
 
 def test_where_fingers_cannot_roll_no_other_knots_are_tried(start: WholeHand) -> None:
