@@ -209,8 +209,9 @@ def straight_path(model: Model) -> Array:
 
 def carried_acceleration(model: Model) -> Array:
     """Acceleration (S, 3), lengths/s², at the samples, that the palm's motion gives an object it carries."""
-    before, now, after = carried_along(model)[:, :, :3]
-    return np.asarray((after - 2 * now + before) / model.schedule.step**2)
+    schedule = model.schedule
+    before, now, after = (carried_along(model, schedule.at(offset))[:, :3] for offset in (-1, 0, 1))
+    return np.asarray((after - 2 * now + before) / schedule.step**2)
 
 
 def pose_bounds(model: Model) -> tuple[Array, Array]:

@@ -35,31 +35,22 @@ def carried_by_palm(model: Model, poses: Array, samples: NDArray[np.int64]) -> A
     return _all_moved(model, poses, samples, back=False)
 
 
-def carried_along(model: Model) -> Array:
-    """What the palm carries from its first pose on: poses (3, S, 6) one step before, at and after the samples.
+def carried_along(model: Model, times: Array) -> Array:
+    """Poses (T, 6) at times (T,) in s of an object that stays, seen from the palm, where its motion starts.
 
-    They are those of an object that stays, seen from the palm, where its motion starts; a drawing's stays in the world.
+    A drawing's stays in the world.
     """
-    if model.tool is not None or stands(model):
-        start = np.concatenate([model.goal_positions[0], model.goal_vectors[0]])
-        return np.tile(start, (3, len(model.schedule.samples), 1))
-    return np.array([_along(model, model.schedule.at(offset)) for offset in (-1, 0, 1)])
+    start = np.concatenate([model.goal_positions[0], model.goal_vectors[0]])
+    if not _carries(model):
+        return np.tile(start, (len(times), 1))
+    first = model.palm_path.at(model.schedule.samples[:1])[0]
+    return np.array([_moved(start, *gone, back=False) for gone in _since(first, model.palm_path.at(times))])
 
 
 def carried_velocity(model: Model) -> Array:
     """Velocity (S, 3), lengths/s, at the samples, of an object that stays on its palm; a drawing's has none."""
-    schedule = model.schedule
-    if model.tool is not None or stands(model):
-        return np.zeros((len(schedule.samples), 3))
-    before, after = (_along(model, schedule.at(share)) for share in (-_INSTANT, _INSTANT))
-    return np.asarray((after - before)[:, :3] / (2 * _INSTANT * schedule.step))
-
-
-def _along(model: Model, times: Array) -> Array:
-    """Poses (T, 6) of what stays where the object starts, as the palm sees it."""
-    start = np.concatenate([model.goal_positions[0], model.goal_vectors[0]])
-    first = model.palm_path.at(model.schedule.samples[:1])[0]
-    return np.array([_moved(start, *gone, back=False) for gone in _since(first, model.palm_path.at(times))])
+    before, after = (carried_along(model, model.schedule.at(share)) for share in (-_INSTANT, _INSTANT))
+    return np.asarray((after - before)[:, :3] / (2 * _INSTANT * model.schedule.step))
 
 
 def added_to_spline(model: Model, offset: int) -> Array:
@@ -67,10 +58,11 @@ def added_to_spline(model: Model, offset: int) -> Array:
 
     Nothing is added at keyframes, and nothing at all where the palm stands.
     """
-    along, schedule = carried_along(model), model.schedule
-    if model.tool is not None or stands(model):
-        return np.zeros_like(along[0])
-    return np.asarray(along[1 + offset] - schedule.spline(offset) @ along[1][schedule.keyframe_samples])
+    schedule = model.schedule
+    along = carried_along(model, schedule.at(offset))
+    if not _carries(model):
+        return np.zeros_like(along)
+    return np.asarray(along - schedule.spline(offset) @ carried_along(model, schedule.keyframes))
 
 
 def poses_at(model: Model, keyframes: Array, offset: int = 0) -> Array:
@@ -87,6 +79,10 @@ def _all_moved(model: Model, poses: Array, samples: NDArray[np.int64], back: boo
     palm = np.hstack([model.palm_position, model.palm_quaternion])
     gone = _since(palm[0], palm)
     return np.array([_moved(pose, *gone[int(k)], back) for pose, k in zip(poses, samples, strict=True)])
+
+
+def _carries(model: Model) -> bool:
+    return model.tool is None and not stands(model)
 
 
 def stands(model: Model) -> bool:

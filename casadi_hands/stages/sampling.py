@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from casadi_hands.motion import Schedule, catmull_rom, continuous, held, linear, nearest_exponential
 from casadi_hands.stages.grasp import on_capsules
 from casadi_hands.stages.model import Model
-from casadi_hands.stages.model import quaternion as quaternion_of
 from casadi_hands.stages.palm_motion import carried_by_palm, goals_seen_from_palm, stands
-from casadi_hands.stages.whole_hand import WholeHand
+from casadi_hands.stages.whole_hand import WholeHand, turned
 
 Array = NDArray[np.float64]
 
@@ -55,6 +54,14 @@ def resampled(hand: WholeHand, before: Model, after: Model) -> WholeHand:
         abrupt = np.isin(interval, [switches - 1, switches])
         return np.asarray(np.where(abrupt[:, None], straight, between) @ angles)
 
+    moves = not stands(before)
+    if moves:
+        # Seen from a palm that only does what the hand adds to its way.
+        path, finer = before.palm_path.at(was), before.palm_path.at(now)
+        turns = zip(hand.palm_quaternion, path[:, 3:], strict=True)
+        position = hand.palm_position - path[:, :3]
+        vectors = np.array([pin.log3(_matrix(ours) @ _matrix(given).T) for ours, given in turns])
+        hand = on_palm(hand, position + path[0, :3], _turned(vectors, np.tile(path[0, 3:], (len(was), 1))))
     quaternion = between @ continuous(hand.palm_quaternion)
     smooth = replace(
         hand,
@@ -67,14 +74,9 @@ def resampled(hand: WholeHand, before: Model, after: Model) -> WholeHand:
         force=np.tensordot(straight, hand.force, axes=1),
         active=hand.active[held(was, now)],
     )
-    if stands(before):
+    if not moves:
         return smooth
-    path, finer = before.palm_path.at(was), before.palm_path.at(now)
-    turns = zip(hand.palm_quaternion, path[:, 3:], strict=True)
-    added = np.array([pin.log3(_matrix(ours) @ _matrix(given).T) for ours, given in turns])
-    turned = zip(between @ added, finer[:, 3:], strict=True)
-    position = finer[:, :3] + between @ (hand.palm_position - path[:, :3])
-    return on_palm(smooth, position, np.array([quaternion_of(pin.exp3(v) @ _matrix(q)) for v, q in turned]))
+    return on_palm(smooth, between @ position + finer[:, :3], _turned(between @ vectors, finer[:, 3:]))
 
 
 def on_palm(hand: WholeHand, palm_position: Array, palm_quaternion: Array) -> WholeHand:
@@ -86,6 +88,10 @@ def on_palm(hand: WholeHand, palm_position: Array, palm_quaternion: Array) -> Wh
         vector[k] = nearest_exponential(turn @ pin.exp3(hand.vector[k]), hand.vector[k] + pin.log3(turn))
     palm = {"palm_position": palm_position, "palm_quaternion": palm_quaternion}
     return replace(hand, position=position, vector=vector, **palm)  # type: ignore[arg-type]
+
+
+def _turned(vectors: Array, quaternions: Array) -> Array:
+    return np.array([turned(q, v) for q, v in zip(quaternions, vectors, strict=True)])
 
 
 def _matrix(quaternion: Array) -> Array:

@@ -214,7 +214,7 @@ class WholeHandStage:
             # Twice differentiable, as a palm moves that carries a load.
             offset = CubicSpline(schedule.keyframes, values["palm"], bc_type="clamped")(schedule.samples)
             position = position + offset[:, :3]
-            orientation = np.array([_turned(q, v) for q, v in zip(orientation, offset[:, 3:], strict=True)])
+            orientation = np.array([turned(q, v) for q, v in zip(orientation, offset[:, 3:], strict=True)])
         active = floating.active[schedule.sample_keyframes]
         point = sampled_points(model, values["point"].reshape(-1, contacts, 3))
         return WholeHand(
@@ -232,6 +232,6 @@ class WholeHandStage:
         )
 
 
-def _turned(start: Array, vector: Array) -> Array:
+def turned(start: Array, vector: Array) -> Array:
     """A quaternion turned further by a rotation vector in the world."""
     return quaternion(pin.exp3(vector) @ pin.Quaternion(*start).matrix())
