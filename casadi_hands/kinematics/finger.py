@@ -9,6 +9,9 @@ import casadi
 
 from casadi_hands.errors import KinematicsError
 
+STAND = 1.05
+"""Height of a finger's first joint above the palm's face, in link radii: the joint's ball turns clear of the face."""
+
 
 @lru_cache
 def finger_kinematics(joints: int) -> casadi.Function:

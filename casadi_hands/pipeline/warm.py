@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +13,7 @@ from scipy.interpolate import CubicSpline
 
 from casadi_hands.design import Design, Finger, Hand, Motion
 from casadi_hands.errors import SolveError
-from casadi_hands.kinematics import finger_kinematics
+from casadi_hands.kinematics import STAND, finger_kinematics
 from casadi_hands.motion import eased, held, linear, nearest_exponential
 from casadi_hands.nlp import Solution
 from casadi_hands.pipeline.certify import AMPLE, FIRM, SMALL
@@ -58,7 +59,9 @@ def warm_start(earlier: Design, task: Task, model: Model) -> WholeHand:
     was = _retold(earlier.hand, motion, old, model)
     on_link = _in_columns(motion, model, motion.contact_point_link) / model.units.length
     on_link = np.tensordot(linear(motion.time, _stretched(old, model)), on_link, axes=1)
-    return _followed(was, _moved(was, task, old, model), on_link, old, model)
+    stood = {finger.name: finger.base[2] / model.units.length for finger in earlier.hand.fingers}
+    rises = [STAND * model.link_radius - stood[model.contact_names[c]] for c in was.contacts]
+    return _followed(was, _moved(was, task, old, model), on_link, rises, old, model)
 
 
 def kept_margin(earlier: Design) -> Margin:
@@ -217,21 +220,25 @@ def _moved_points(points: Array, old: Model, model: Model) -> Array:
     return np.array([on_capsules(p, capsules) for p in moved])
 
 
-def _followed(was: WholeHand, moved: WholeHand, on_link: Array, old: Model, model: Model) -> WholeHand:
+def _followed(
+    was: WholeHand, moved: WholeHand, on_link: Array, rises: Sequence[float], old: Model, model: Model
+) -> WholeHand:
     """Joints turned so that links follow their contacts in the palm's frame, as far as they can.
 
     Args:
         was: the motion before it was moved.
         moved: the motion after, with the joints of before.
         on_link: (S, C, 3) contacts on the links, link frame.
+        rises: by how much each finger stands higher on the palm than before.
         old: of ``was``.
         model: of ``moved``.
     """
     away = _contacts(moved, model) - _contacts(was, old)
     fingers, angles = [], []
     for i, (finger, contact) in enumerate(zip(moved.fingers, moved.contacts, strict=True)):
+        ways = away[:, contact] - [0, 0, rises[i]]
         turned = np.array(
-            [_reach(finger, *row) for row in zip(moved.angles[i], on_link[:, contact], away[:, contact], strict=True)]
+            [_reach(finger, *row) for row in zip(moved.angles[i], on_link[:, contact], ways, strict=True)]
         )
         angles.append(turned)
         fingers.append(replace(finger, angles=turned[model.schedule.keyframe_samples]))

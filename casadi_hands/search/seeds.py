@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from casadi_hands.kinematics import STAND
 from casadi_hands.stages.synthesis import FingerSeed
 from casadi_hands.stages.target import Target
 
@@ -20,7 +21,7 @@ def random_finger(target: Target, contact: int, joints: int, rng: np.random.Gene
     shortest, longest = target.link_length
     direction, distance = rng.uniform(0, 2 * np.pi), np.sqrt(rng.uniform())
     base = (target.palm_radius - target.link_radius) * distance * np.array([np.cos(direction), np.sin(direction)])
-    span = np.linalg.norm(target.points[:, contact].mean(axis=0) - np.append(base, 0))
+    span = np.linalg.norm(target.points[:, contact].mean(axis=0) - np.append(base, STAND * target.link_radius))
     lengths = np.clip(rng.uniform(0.8, 1.6, joints) * span / joints, shortest, longest)
     angles = rng.uniform(0.6 * low, 0.6 * high, joints)
     tip = target.tip_arc * rng.uniform(-0.7, 0.7, (target.strings(contact), 2))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from casadi_hands.kinematics import STAND
 from casadi_hands.motion import Schedule
 from casadi_hands.reasons import Reason, joints_of
 from casadi_hands.search.score import TIP_WEIGHT, worst_miss
@@ -32,13 +33,14 @@ WITHOUT_CONTACT = WITHOUT_FORCE | {"gap", "penetration", "joint_limit"}
 def beyond_reach(target: Target, contact: int, joints: int) -> Array:
     """How far (N,) a contact lies beyond the longest finger at each keyframe, half extents; negative within reach.
 
-    The finger starts anywhere on the palm's disc, its links are as long as allowed and in one line, and the contact
+    The finger stands anywhere on the palm's disc, its links are as long as allowed and in one line, and the contact
     is on its tip's surface. Joint limits and what is in the way only make the true reach smaller.
     """
     points = target.points[:, contact]
     outside = np.maximum(np.hypot(points[:, 0], points[:, 1]) - target.palm_radius, 0.0)
     reach = joints * target.link_length[1] + target.link_radius
-    return np.where(target.active[:, contact], np.hypot(outside, points[:, 2]) - reach, -np.inf)
+    height = points[:, 2] - STAND * target.link_radius
+    return np.where(target.active[:, contact], np.hypot(outside, height) - reach, -np.inf)
 
 
 def shortcoming(target: Target, hand: Synthesised, contact: int, score: float) -> Reason:

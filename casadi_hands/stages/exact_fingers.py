@@ -72,7 +72,7 @@ class Scene:
         to_palm = rotation_matrix(conjugate(self.palm_quaternion))
         rotation = ca.mtimes(to_palm, rotation_matrix(quaternion))
         in_palm = ca.mtimes(rotation, point) + ca.mtimes(to_palm, position - self.palm_position)
-        skeleton = symbols.placed(angles)
+        skeleton = symbols.placed(angles, self.radius)
         on_link = ca.mtimes(skeleton.tip_rotation.T, in_palm - skeleton.origins[:, -1])
         off_object, normal = smooth_surface(point, self.capsule[:3], self.capsule[3:6], self.capsule[6])
         end = ca.vertcat(0, 0, symbols.lengths[-1])
@@ -80,7 +80,7 @@ class Scene:
         from_link = ca.mtimes(rotation.T, ca.mtimes(skeleton.tip_rotation, from_end))
         from_object = from_axis(point, self.capsule[:3], self.capsule[3:6])
         off_link = from_link + self.radius / self.capsule[6] * from_object
-        here = symbols.placed(angles, on_link)
+        here = symbols.placed(angles, self.radius, on_link)
         return Touch(on_link, off_object, off_link, normal, from_end / norm(from_end, 1e-6), rotation, here)
 
 
@@ -221,7 +221,7 @@ def apart(joints: int, primitives: int, touched: int | None, grounded: bool) -> 
         )
         for k in range(primitives)
     ]
-    here = symbols.placed(angles)
+    here = symbols.placed(angles, radius)
     up = to_palm[:, 2] if grounded else None
     clear, last = distances(here, radius, palm_radius, ca.horzcat(*seen), up, ground - palm_position[2])
     others = [last[k] for k in range(primitives) if k != touched]
@@ -239,7 +239,8 @@ def fingers_apart(joints: int, other_joints: int) -> Kernel:
     other_angles = kernel.variable("angles_b", other_joints)
     radius = kernel.parameter("radius")
     kernel.constrain(
-        "clear", clearance.links_and_links(first.placed(angles).ends, second.placed(other_angles).ends, radius)
+        "clear",
+        clearance.links_and_links(first.placed(angles, radius).ends, second.placed(other_angles, radius).ends, radius),
     )
     return kernel
 

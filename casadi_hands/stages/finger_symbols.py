@@ -10,7 +10,7 @@ import casadi as ca
 from casadi import SX
 
 from casadi_hands.geometry import clamp, norm
-from casadi_hands.kinematics import finger_kinematics
+from casadi_hands.kinematics import STAND, finger_kinematics
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,7 @@ class FingerSymbols:
     """One finger in a kernel, palm frame.
 
     Attributes:
-        base: (2,) on the palm's plane.
+        base: (2,) of the first joint, which stands ``STAND`` link radii above the palm's face.
         lengths: (n,).
         axes: (3, n) unit joint axes, parent frames.
     """
@@ -32,11 +32,11 @@ class FingerSymbols:
         """Number of joints."""
         return int(self.lengths.numel())
 
-    def placed(self, angles: SX, point: SX | None = None) -> PlacedFinger:
-        """The finger at joint angles (n,), with a contact point (3,) in the last link's frame."""
+    def placed(self, angles: SX, radius: SX, point: SX | None = None) -> PlacedFinger:
+        """The finger at joint angles (n,), with links of a radius and a contact point (3,) in the last link's frame."""
         function = finger_kinematics(self.joints)
         at = SX.zeros(3, 1) if point is None else point
-        base = ca.vertcat(self.base, 0)
+        base = ca.vertcat(self.base, STAND * radius)
         origins, rotations, tip, contact, jacobian = function(base, self.axes, self.lengths, angles, at)
         return PlacedFinger(origins, rotations, tip, contact, jacobian)
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from casadi_hands.design import Finger, Hand, Link, Motion
+from casadi_hands.kinematics import STAND
 from casadi_hands.motion import continuous
 from casadi_hands.stages.finger_numbers import link_frames
 from casadi_hands.stages.floating import Floating
@@ -29,6 +31,7 @@ from casadi_hands.task import Task
 
 Array = NDArray[np.float64]
 _RESERVE = 1.5  # of torque and speed limits over what the motion uses, where the task names no actuator
+_LEAST = 0.01  # of the object's weight × half extent, and rad/s: no joint is so weak or slow that none could drive it
 
 
 def hand_of(
@@ -51,7 +54,7 @@ def hand_of(
             Link(float(part * length), model.link_radius * length, _triple(a / np.linalg.norm(a)))
             for part, a in zip(finger.lengths, finger.axis_vectors, strict=True)
         )
-        base = (float(finger.base[0] * length), float(finger.base[1] * length), 0.0)
+        base = _triple(np.append(finger.base, STAND * model.link_radius) * length)
         built.append(Finger(model.contact_names[contact], base, links))
     actuator = task.actuator
     return Hand(
@@ -60,8 +63,8 @@ def hand_of(
         fingers=tuple(built),
         joint_lower=model.joint_limits[0],
         joint_upper=model.joint_limits[1],
-        effort=_RESERVE * effort if actuator is None else actuator.torque,
-        velocity=_RESERVE * speed if actuator is None else actuator.speed,
+        effort=max(_RESERVE * effort, _LEAST * model.units.torque) if actuator is None else actuator.torque,
+        velocity=max(_RESERVE * speed, _LEAST) if actuator is None else actuator.speed,
         density=task.hand.density,
     )
 
@@ -112,7 +115,7 @@ def whole_hand_motion(model: Model, result: WholeHand) -> Motion:
     for i, (finger, contact) in enumerate(zip(result.fingers, result.contacts, strict=True)):
         links[contact] = f"finger{i}_link{finger.joints - 1}"
         tip = np.array([*np.zeros(3), 0, 0, finger.lengths[-1], model.link_radius])
-        origins, rotations = link_frames(finger, result.angles[i])
+        origins, rotations = link_frames(finger, model.link_radius, result.angles[i])
         from_origin = in_palm(model, result, point[:, contact]) - origins[:, -1]
         local = np.einsum("sji,sj->si", rotations[:, -1], from_origin)
         on_link[:, contact] = on_capsules(local, np.tile(tip, (count, 1)))
@@ -125,7 +128,16 @@ def whole_hand_motion(model: Model, result: WholeHand) -> Motion:
     touch = [c for c, link in enumerate(links) if link != "none"]
     contacts = tuple(names[c] for c in touch), [links[c] for c in touch]
     active, force, point, on_link = result.active[:, touch], result.force[:, touch], point[:, touch], on_link[:, touch]
-    return _motion(model, *object_pose, *palm, angles, joint_names, *contacts, active, force, point, on_link)
+    motion = _motion(model, *object_pose, *palm, angles, joint_names, *contacts, active, force, point, on_link)
+    if result.disturbed is None:
+        return motion
+    rotations = np.array([object_rotation(model, v) for v in result.vector])
+    return replace(
+        motion,
+        contact_force_disturbed=np.einsum("sij,scj->sci", rotations, result.disturbed[:, touch]) * model.units.force,
+        external_force_disturbed=model.perturbation_force * model.units.force,
+        external_torque_disturbed=model.perturbation_torque * model.units.torque,
+    )
 
 
 def _motion(
@@ -167,12 +179,14 @@ def _motion(
 
 
 def joint_loads(model: Model, result: WholeHand) -> tuple[float, float]:
-    """Largest joint torque (N·m, from contact forces) and speed (rad/s) of a motion."""
+    """Largest joint torque (N·m, from contact forces, disturbed ones too) and speed (rad/s) of a motion."""
     torque, speed = 0.0, 0.0
     steps = np.diff(model.schedule.samples)[:, None]
     for i, contact in enumerate(result.contacts):
         speed = max(speed, float(np.abs(np.diff(result.angles[i], axis=0) / steps).max()))
-        force = turned_to_palm(result, turned_to_world(model, result, result.force[:, contact]))
-        torques = np.einsum("sij,si->sj", contact_jacobians(model, result, i), force)
-        torque = max(torque, float(np.abs(torques).max()))
+        jacobians = contact_jacobians(model, result, i)
+        for forces in (result.force, result.disturbed):
+            if forces is not None:
+                force = turned_to_palm(result, turned_to_world(model, result, forces[:, contact]))
+                torque = max(torque, float(np.abs(np.einsum("sij,si->sj", jacobians, force)).max()))
     return torque * model.units.torque, speed

@@ -286,6 +286,10 @@ class RefineStage:
         active[:, columns] = self.structure.active
         point[:, columns] = values["point"].reshape(count, -1, 3)
         force[:, columns] = values["force"].reshape(count, -1, 3)
+        disturbed = None
+        if len(pushed := self.built.pushed):
+            disturbed = force.copy()
+            disturbed[np.ix_(pushed, columns)] = values["force_pushed"].reshape(len(pushed), -1, 3)
         fingers = tuple(
             replace(
                 old,
@@ -306,6 +310,7 @@ class RefineStage:
             force=force,
             active=active,
             solution=solution,
+            disturbed=disturbed,
         )
         worst = self._worst(solution)
         hopeless = what != "exact"

@@ -73,6 +73,7 @@ def resampled(hand: WholeHand, before: Model, after: Model) -> WholeHand:
         point=np.tensordot(between, hand.point, axes=1),
         force=np.tensordot(straight, hand.force, axes=1),
         active=hand.active[held(was, now)],
+        disturbed=None,
     )
     if not moves:
         return smooth

@@ -35,16 +35,16 @@ def touch(joints: int, moves: bool) -> Kernel:
     position, quaternion = placed(pose, reference)
     rotation = rotation_matrix(quaternion)
     in_palm = palm.sees(position + ca.mtimes(rotation, point))
-    skeleton = symbols.placed(angles)
+    skeleton = symbols.placed(angles, radius)
     last = skeleton.origins[:, -1]
     on_link = ca.mtimes(skeleton.tip_rotation.T, in_palm - last)
-    here = symbols.placed(angles, on_link)
+    here = symbols.placed(angles, radius, on_link)
     projection, normal, _ = project_to_capsule(on_link, SX.zeros(3, 1), ca.vertcat(0, 0, symbols.lengths[-1]), radius)
     force_in_palm = palm.turned(ca.mtimes(rotation, force))
     kernel.cost("contact_on_finger", contact.off_surface(force, activity, on_link, projection), "sum")
     position_before, quaternion_before = placed(pose_before, reference)
     object_moved = in_palm - palm_before.sees(position_before + ca.mtimes(rotation_matrix(quaternion_before), point))
-    finger_moved = in_palm - symbols.placed(angles_before, on_link).contact
+    finger_moved = in_palm - symbols.placed(angles_before, radius, on_link).contact
     kernel.cost("slip_on_finger", contact.slip(force, activity, object_moved, finger_moved, step))
     cone = contact.friction_cone(force_in_palm, ca.mtimes(here.tip_rotation, normal), friction, sharpness)
     kernel.cost("friction_cone_hand", activity * cone, "sum")
@@ -60,7 +60,7 @@ def move(joints: int) -> Kernel:
     angles = [kernel.variable(f"angles{i}", joints) for i in range(3)]
     symbols = given_morphology(kernel, joints)
     lowest, highest, step = kernel.parameter("lowest"), kernel.parameter("highest"), kernel.parameter("step")
-    before, now, after = (symbols.placed(a).tip for a in angles)
+    before, now, after = (symbols.placed(a, SX(0)).tip for a in angles)  # wherever it stands
     kernel.cost("finger_acceleration", finger.tip_acceleration(before, now, after, step))
     kernel.cost("joint_limits", ca.vertcat(ca.fmax(angles[1] - highest, 0), ca.fmax(lowest - angles[1], 0)))
     return kernel
@@ -87,7 +87,7 @@ def object_clearance(joints: int, primitives: int, moves: bool) -> Kernel:
     in_palm = ca.horzcat(
         *[ca.vertcat(seen(shapes[:3, k]), seen(shapes[3:6, k]), shapes[6, k]) for k in range(primitives)]
     )
-    here = symbols.placed(angles)
+    here = symbols.placed(angles, radius)
     up = palm.turned(SX([0, 0, 1]))
     apart, touching = distances(here, radius, palm_radius, in_palm, up, ground - palm.position[2])
     kernel.cost("collision", clearance.overlap(ca.vertcat(margin - apart, -touching)), "sum")
@@ -117,7 +117,9 @@ def finger_clearance(joints: int, other_joints: int) -> Kernel:
     angles, other_angles = kernel.variable("angles_a", joints), kernel.variable("angles_b", other_joints)
     first, second = given_morphology(kernel, joints, "_a"), given_morphology(kernel, other_joints, "_b")
     radius, margin = kernel.parameter("radius"), kernel.parameter("margin")
-    apart = clearance.links_and_links(first.placed(angles).ends, second.placed(other_angles).ends, radius)
+    apart = clearance.links_and_links(
+        first.placed(angles, radius).ends, second.placed(other_angles, radius).ends, radius
+    )
     kernel.cost("collision", clearance.overlap(margin - apart), "sum")
     return kernel
 

@@ -257,7 +257,7 @@ def _follow(joints: int) -> Kernel:
         for name, size in (("target", 3), ("force", 3), ("active", 1), ("radius", 1), ("lowest", 1), ("highest", 1))
     )
     point, _ = tip_point(tip, symbols.lengths[-1], radius)
-    placed = symbols.placed(angles, point)
+    placed = symbols.placed(angles, radius, point)
     kernel.cost("tip_target", active * (placed.contact - target))
     kernel.cost("null_space", active * finger.null_space(placed.jacobian, force), "sum")
     kernel.cost("torque", active * finger.joint_torques(placed.jacobian, force))
@@ -289,7 +289,7 @@ def _collide(joints: int, primitives: int) -> Kernel:
     radius, palm_radius, margin = (kernel.parameter(name) for name in ("radius", "palm_radius", "margin"))
     shapes = ca.reshape(kernel.parameter("primitives", 7 * primitives), 7, primitives)
     up, ground = kernel.parameter("up", 3), kernel.parameter("ground")
-    ends = symbols.placed(angles).ends
+    ends = symbols.placed(angles, radius).ends
     apart = [
         clearance.links_and_palm(ends, radius, palm_radius),
         clearance.links_and_ground(ends, radius, up, ground),
@@ -312,7 +312,8 @@ def _keep_apart(joints: int, other_joints: int) -> Kernel:
     second = morphology(kernel.variable, other_frames, other_joints, "_b")
     other_angles = kernel.variable("angles_b", other_joints)
     radius, margin = kernel.parameter("radius"), kernel.parameter("margin")
-    distances = clearance.links_and_links(first.placed(angles).ends, second.placed(other_angles).ends, radius)
+    ends = first.placed(angles, radius).ends, second.placed(other_angles, radius).ends
+    distances = clearance.links_and_links(*ends, radius)
     kernel.cost("collision", clearance.overlap(margin - distances), "sum")
     return kernel
 
@@ -323,7 +324,8 @@ def _travel(joints: int) -> Kernel:
     kernel = Kernel("travel")
     frames = kernel.parameter("frames", 9 * joints)
     symbols = morphology(kernel.variable, frames, joints)
-    before, now, after = (symbols.placed(kernel.variable(f"angles{i}", joints)).tip for i in range(3))
+    # Wherever it stands: only how its tip moves counts.
+    before, now, after = (symbols.placed(kernel.variable(f"angles{i}", joints), ca.SX(0)).tip for i in range(3))
     acceleration = finger.tip_acceleration(before, now, after, kernel.parameter("step"))
     kernel.cost("fingertip_acceleration", acceleration)
     return kernel

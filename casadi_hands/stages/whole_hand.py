@@ -33,6 +33,7 @@ Array = NDArray[np.float64]
 # The start is near what is wanted: a small barrier, and no push away from bounds, halve the iterations of a large one.
 OPTIONS = Options(mu_init=1e-3, extra=(("bound_push", 1e-4), ("bound_frac", 1e-4)))
 BROKEN = 1e-2  # violation of a solve that lost its way, from which another barrier leads elsewhere
+_FORCES = "force", "force_perturbed"
 FARTHEST_PALM = 2.0  # half extents and rad, how far a palm that may move leaves its given motion
 
 
@@ -52,6 +53,7 @@ class WholeHand:
         force: (S, C, 3) object frame.
         active: (S, C) bool.
         solution: of the solver.
+        disturbed: (S, C, 3) forces that hold the object on the same path under the task's perturbations; None without.
     """
 
     fingers: tuple[FingerSeed, ...]
@@ -65,6 +67,7 @@ class WholeHand:
     force: Array
     active: NDArray[np.bool_]
     solution: Solution
+    disturbed: Array | None = None
 
 
 class WholeHandStage:
@@ -217,6 +220,9 @@ class WholeHandStage:
             orientation = np.array([turned(q, v) for q, v in zip(orientation, offset[:, 3:], strict=True)])
         active = floating.active[schedule.sample_keyframes]
         point = sampled_points(model, values["point"].reshape(-1, contacts, 3))
+        forces = {
+            name: values[name].reshape(-1, contacts, 3) * active[:, :, None] for name in _FORCES if name in values
+        }
         return WholeHand(
             fingers=moved,
             contacts=self.contacts,
@@ -226,9 +232,10 @@ class WholeHandStage:
             position=pose[:, :3],
             vector=pose[:, 3:],
             point=point,
-            force=values["force"].reshape(-1, contacts, 3) * active[:, :, None],
+            force=forces["force"],
             active=active,
             solution=solution,
+            disturbed=forces.get("force_perturbed"),
         )
 
 

@@ -49,7 +49,7 @@ def contact_jacobians(model: Model, motion: WholeHand, finger: int) -> Array:
         finger: index of the finger among the motion's.
     """
     own = motion.fingers[finger]
-    origins, rotations = link_frames(own, motion.angles[finger])
+    origins, rotations = link_frames(own, model.link_radius, motion.angles[finger])
     axes = np.einsum("kjab,jb->kja", rotations, own.axis_vectors)
     contact = in_palm(model, motion, motion.point[:, motion.contacts[finger]])
     return np.ascontiguousarray(np.cross(axes, contact[:, None] - origins).transpose(0, 2, 1))
