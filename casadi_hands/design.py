@@ -79,7 +79,11 @@ class Hand:
 
 @dataclass(frozen=True)
 class Motion:
-    """The arrays of ``motion.npz``: same names, shapes, units and frames (see ``docs/result-folder.md``)."""
+    """The arrays of ``motion.npz``: same names, shapes, units and frames (see ``docs/result-folder.md``).
+
+    Commands are None until there is a hand, and in files of versions that did not write them; what is disturbed is None
+    where the task names no perturbation.
+    """
 
     time: np.ndarray
     object_position: np.ndarray
@@ -96,6 +100,12 @@ class Motion:
     contact_point_link: np.ndarray
     external_force: np.ndarray
     external_torque: np.ndarray
+    joint_velocities: np.ndarray | None = None
+    joint_torques: np.ndarray | None = None
+    joint_commands: np.ndarray | None = None
+    contact_force_disturbed: np.ndarray | None = None
+    external_force_disturbed: np.ndarray | None = None
+    external_torque_disturbed: np.ndarray | None = None
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,14 @@ _SHAPES: dict[str, tuple[str | int, ...]] = {
     "contact_point_link": ("S", "C", 3),
     "external_force": ("S", 3),
     "external_torque": ("S", 3),
+    "joint_velocities": ("S", "J"),
+    "joint_torques": ("S", "J"),
+    "joint_commands": ("S", "J"),
+    "contact_force_disturbed": ("S", "C", 3),
+    "external_force_disturbed": ("S", 3),
+    "external_torque_disturbed": ("S", 3),
 }
+_OPTIONAL = frozenset(item.name for item in fields(Motion) if item.default is None)
 _FIRST_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest a zip file can hold: a stamp that says nothing
 
 
@@ -68,11 +75,11 @@ def load_motion(path: Path) -> Motion:
             stored = {name: file[name] for name in file.files}
     except (OSError, ValueError, zipfile.BadZipFile) as error:
         raise DesignError(f"{path}: not a motion file: {error}") from error
-    missing = [name for name in _SHAPES if name not in stored]
+    missing = [name for name in _SHAPES if name not in stored and name not in _OPTIONAL]
     if missing:
         raise DesignError(f"{path}: the motion lacks {', '.join(missing)}")
     _check(stored, path)
-    entries: dict[str, Any] = {name: stored[name] for name in _SHAPES}
+    entries: dict[str, Any] = {name: stored.get(name) for name in _SHAPES}
     entries |= {name: tuple(str(item) for item in stored[name]) for name in _NAMES}
     return Motion(**entries)
 
@@ -82,6 +89,8 @@ def _arrays(motion: Motion) -> dict[str, np.ndarray]:
     arrays: dict[str, np.ndarray] = {}
     for item in fields(motion):
         value = getattr(motion, item.name)
+        if value is None:
+            continue
         kind = np.str_ if item.name in _NAMES else np.bool_ if item.name == "contact_active" else np.float64
         arrays[item.name] = np.array(value, dtype=kind, order="C")
     return arrays
@@ -91,6 +100,8 @@ def _check(arrays: dict[str, np.ndarray], path: Path) -> None:
     """Raise `DesignError` unless every array has its shape and only finite numbers."""
     sizes: dict[str, int] = {}
     for name, shape in _SHAPES.items():
+        if name not in arrays:
+            continue
         array = arrays[name]
         expected = tuple(
             sizes.setdefault(size, array.shape[k] if k < array.ndim else -1) if isinstance(size, str) else size

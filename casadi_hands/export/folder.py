@@ -9,6 +9,7 @@ from typing import Any
 from casadi_hands.design import Design
 from casadi_hands.errors import DesignError, TaskError
 from casadi_hands.export.arrays import load_motion, save_motion
+from casadi_hands.export.commands import commanded
 from casadi_hands.export.mjcf import scene_mjcf
 from casadi_hands.export.record import FORMAT, STATUSES, design_record, hand_from_record, record_text
 from casadi_hands.export.urdf import hand_urdf, object_urdf
@@ -45,15 +46,18 @@ def save_design(design: Design, directory: Path, page: bool = True) -> None:
 
 
 def _write(design: Design, directory: Path, page: bool) -> None:
+    motion = design.motion
     texts = {"task.yaml": task_to_yaml(design.task), "object.urdf": object_urdf(design.task)}
     if design.hand is not None:
         texts["hand.urdf"] = hand_urdf(design.hand)
-        if design.motion is not None:
-            texts["scene.xml"] = scene_mjcf(design.task, design.hand, design.motion)
+        if motion is not None:
+            if motion.joint_commands is None:
+                motion = commanded(design.task, design.hand, motion)
+            texts["scene.xml"] = scene_mjcf(design.task, design.hand, motion)
     for name, text in texts.items():
         (directory / name).write_text(text, encoding="utf-8")
-    if design.motion is not None:
-        save_motion(design.motion, directory / "motion.npz")
+    if motion is not None:
+        save_motion(motion, directory / "motion.npz")
     if page:
         write_page(design, directory / "viewer.html")
     (directory / "result.json").write_text(record_text(design_record(design)), encoding="utf-8")

@@ -11,7 +11,9 @@ Choices a reader of the file should know:
   MuJoCo's regularised friction, is held down by ``impratio`` and the no-slip pass.
 - **Motors.** See `casadi_hands.export.motors`; torque is limited to the hand's effort. The hand carries its own weight
   (``gravcomp``), as a controller that knows its hand does. Targets are not clamped, so that a feed-forward torque can
-  be given as an offset of the target.
+  be given as an offset of the target (see `casadi_hands.export.commands`).
+- **Start.** Bodies stand as at the motion's first sample, whose joint angles are the joints' reference: what loads the
+  scene and resets nothing finds no finger in the object.
 - **Collisions.** Neighbours in a chain, the palm and first links among them, do not collide; all else does.
 """
 
@@ -22,7 +24,9 @@ from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
+from casadi_hands.export.commands import commanded
 from casadi_hands.export.inertia import Inertial, link_inertial, palm_inertial
 from casadi_hands.export.markup import (
     GROUND_COLOR,
@@ -47,13 +51,19 @@ _STILL = 1e-9  # a palm that moves less, relative to its size (or in its quatern
 
 
 def scene_mjcf(task: Task, hand: Hand, motion: Motion) -> str:
-    """The scene as MJCF text, with the keyframe ``start`` at the motion's first sample.
+    """The scene as MJCF text, as it stands at the motion's first sample.
+
+    The keyframes ``start`` and ``goal1``, ``goal2``, … hold the poses at the first sample and at the task's goals, and
+    the commands that press there as planned.
 
     Args:
         task: gives the object, gravity, friction, ground.
         hand: the designed hand.
-        motion: its first sample places palm, joints and object; it also says whether the palm moves.
+        motion: its first sample places palm, joints and object; it also says whether the palm moves. Without commands
+            it is given them.
     """
+    if motion.joint_commands is None:
+        motion = commanded(task, hand, motion)
     moves = _palm_moves(hand, motion)
     motors = joint_motors(task, hand)
     root = Element("mujoco", model=task.name)
@@ -71,7 +81,7 @@ def scene_mjcf(task: Task, hand: Hand, motion: Motion) -> str:
         weld = {"body1": "palm_target", "body2": "palm", "solref": number(2.5 * _TIME_STEP) + " 1"}
         SubElement(SubElement(root, "equality"), "weld", weld)
     _add_actuators(root, hand, motors)
-    _add_start(root, motion, moves)
+    _add_keyframes(root, task, motion, moves)
     return document(root)
 
 
@@ -171,20 +181,36 @@ def _add_hand(world: Element, task: Task, hand: Hand, motion: Motion, motors: tu
     )
     remaining = iter(motors)
     for i, finger in enumerate(hand.fingers):
-        _add_finger(palm, hand, i, finger, [next(remaining) for _ in finger.links], friction)
+        names = [f"finger{i}_joint{j}" for j in range(len(finger.links))]
+        joints = [(next(remaining), motion.joint_angles[0, motion.joint_names.index(name)]) for name in names]
+        _add_finger(palm, hand, i, finger, joints, friction)
 
 
-def _add_finger(palm: Element, hand: Hand, i: int, finger: Finger, motors: list[Motor], friction: str) -> None:
-    """Add one finger as a chain of nested bodies; `i` is its place in the hand."""
+def _add_finger(
+    palm: Element, hand: Hand, i: int, finger: Finger, joints: list[tuple[Motor, float]], friction: str
+) -> None:
+    """Add one finger as a chain of nested bodies, turned as at the start.
+
+    Args:
+        palm: the body it stands on.
+        hand: it belongs to.
+        i: its place in the hand.
+        finger: its links.
+        joints: motor and angle at the start, rad, of each joint.
+        friction: of its surface.
+    """
     parent, origin = palm, np.asarray(finger.base)
-    for j, (link, motor) in enumerate(zip(finger.links, motors, strict=True)):
+    for j, (link, (motor, angle)) in enumerate(zip(finger.links, joints, strict=True)):
         name = f"finger{i}_link{j}"
-        body = SubElement(parent, "body", name=name, pos=numbers(origin), gravcomp="1")
+        # A turn about its own axis leaves the axis where it is, so that it is the URDF's.
+        turn = Rotation.from_rotvec(angle * np.asarray(link.axis)).as_quat(scalar_first=True)
+        body = SubElement(parent, "body", name=name, pos=numbers(origin), quat=numbers(turn), gravcomp="1")
         SubElement(
             body,
             "joint",
             name=f"finger{i}_joint{j}",
             axis=numbers(link.axis),
+            ref=number(angle),
             limited="true",
             range=numbers((hand.joint_lower, hand.joint_upper)),
             armature=number(motor.armature),
@@ -234,12 +260,18 @@ def _add_actuators(root: Element, hand: Hand, motors: tuple[Motor, ...]) -> None
         )
 
 
-def _add_start(root: Element, motion: Motion, moves: bool) -> None:
-    """Add the keyframe ``start``; MuJoCo orders coordinates as the bodies stand in the file."""
-    base = (*motion.base_position[0], *motion.base_orientation[0]) if moves else ()
-    item = (*motion.object_position[0], *motion.object_orientation[0])
-    key = {"name": "start", "qpos": numbers((*base, *motion.joint_angles[0], *item))}
-    key["ctrl"] = numbers(motion.joint_angles[0])
-    if moves:
-        key["mpos"], key["mquat"] = numbers(base[:3]), numbers(base[3:])
-    SubElement(SubElement(root, "keyframe"), "key", key)
+def _add_keyframes(root: Element, task: Task, motion: Motion, moves: bool) -> None:
+    """Add the keyframes of start and goals; MuJoCo orders coordinates as the bodies stand in the file."""
+    assert motion.joint_commands is not None
+    parent = SubElement(root, "keyframe")
+    moments = {"start": 0.0, **{f"goal{n}": goal.at for n, goal in enumerate(task.motion, start=1)}}
+    for name, time in moments.items():
+        k = int(np.argmin(np.abs(motion.time - time)))
+        base = (*motion.base_position[k], *motion.base_orientation[k]) if moves else ()
+        item = (*motion.object_position[k], *motion.object_orientation[k])
+        key = {"name": name, "time": number(motion.time[k])}
+        key["qpos"] = numbers((*base, *motion.joint_angles[k], *item))
+        key["ctrl"] = numbers(motion.joint_commands[k])
+        if moves:
+            key["mpos"], key["mquat"] = numbers(base[:3]), numbers(base[3:])
+        SubElement(parent, "key", key)

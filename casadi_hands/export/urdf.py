@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from casadi_hands.export.inertia import Inertial, link_inertial, palm_inertial
 from casadi_hands.export.markup import (
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
     from casadi_hands.task import Task
 
 
-def hand_urdf(hand: Hand) -> str:
+def hand_urdf(hand: Hand, world: tuple[Sequence[float], Sequence[float]] | None = None) -> str:
     """The hand as URDF text.
 
     Link ``palm`` is the palm frame; ``finger{i}_link{j}`` has its origin at its joint and z along the segment. At
@@ -32,8 +34,18 @@ def hand_urdf(hand: Hand) -> str:
 
     Args:
         hand: the designed hand.
+        world: position (3,), m, and orientation [w, x, y, z] of a palm that is fixed to a link ``world``; without, the
+            palm is the root.
     """
     robot = _robot("hand")
+    if world is not None:
+        position, orientation = world
+        SubElement(robot, "link", name="world")
+        fixed = SubElement(robot, "joint", name="world_to_palm", type="fixed")
+        SubElement(fixed, "parent", link="world")
+        SubElement(fixed, "child", link="palm")
+        turn = Rotation.from_quat(orientation, scalar_first=True).as_euler("xyz")
+        SubElement(fixed, "origin", xyz=numbers(position), rpy=numbers(turn.tolist()))
     palm = SubElement(robot, "link", name="palm")
     _add_inertial(palm, palm_inertial(hand))
     middle = np.array([0.0, 0.0, -hand.palm_thickness / 2])
@@ -41,6 +53,8 @@ def hand_urdf(hand: Hand) -> str:
         _add_shape(palm, role, _cylinder(hand.palm_radius, hand.palm_thickness), middle, (0.0, 0.0, 0.0), PALM_COLOR)
     for i, finger in enumerate(hand.fingers):
         _add_finger(robot, hand, i, finger)
+    for name in hand.joint_names:
+        _add_transmission(robot, name)
     return document(robot)
 
 
@@ -88,6 +102,16 @@ def _add_finger(robot: Element, hand: Hand, i: int, finger: Finger) -> None:
         _add_inertial(body, link_inertial(link, hand.density))
         _add_capsule(body, np.zeros(3), np.array([0.0, 0.0, link.length]), link.radius, finger_color(i), joint_color(i))
         parent, origin = name, np.array([0.0, 0.0, link.length])
+
+
+def _add_transmission(robot: Element, joint: str) -> None:
+    """Add a motor that turns the joint one to one; what reads no transmissions takes the joint's limits."""
+    transmission = SubElement(robot, "transmission", name=f"{joint}_transmission")
+    SubElement(transmission, "type").text = "transmission_interface/SimpleTransmission"
+    driven = SubElement(transmission, "joint", name=joint)
+    SubElement(driven, "hardwareInterface").text = "hardware_interface/PositionJointInterface"
+    motor = SubElement(transmission, "actuator", name=f"{joint}_motor")
+    SubElement(motor, "mechanicalReduction").text = "1"
 
 
 def _add_inertial(link: Element, inertial: Inertial) -> None:

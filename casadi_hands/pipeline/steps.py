@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from concurrent.futures import Executor
 
+from casadi_hands.export.commands import commanded
 from casadi_hands.pipeline.record import Record
 from casadi_hands.search.algorithm import Candidate, Found, Search, run_record
 from casadi_hands.stages.floating import Floating, FloatingStage, solve_floating
@@ -85,4 +86,4 @@ def adopt(record: Record, model: Model, result: WholeHand) -> None:
     """Make a hand and its motion the record's."""
     torque, speed = joint_loads(model, result)
     hand = hand_of(record.task, model, result.fingers, result.contacts, torque, speed)
-    record.update(hand=hand, motion=whole_hand_motion(model, result))
+    record.update(hand=hand, motion=commanded(record.task, hand, whole_hand_motion(model, result)))
