@@ -289,7 +289,7 @@ class RefineStage:
         disturbed = None
         if len(pushed := self.built.pushed):
             disturbed = force.copy()
-            disturbed[np.ix_(pushed, columns)] = values["force_pushed"].reshape(len(pushed), -1, 3)
+            disturbed[pushed[:, None], columns] = values["force_pushed"].reshape(len(pushed), -1, 3)
         fingers = tuple(
             replace(
                 old,

@@ -115,13 +115,15 @@ def read_folder(directory: str | Path) -> Folder:
 
 
 def _read_motion(path: Path) -> Motion:
-    names = list(Motion.__dataclass_fields__)
+    names, optional = [], []
+    for name, item in Motion.__dataclass_fields__.items():
+        (optional if item.default is None else names).append(name)
     try:
         with np.load(path, allow_pickle=False) as file:
             missing = [name for name in names if name not in file]
             if missing:
                 raise DesignError(f"{path}: no array {', '.join(missing)}")
-            arrays = {name: file[name] for name in names}
+            arrays = {name: file[name] for name in [*names, *optional] if name in file}
     except (OSError, ValueError) as error:
         raise DesignError(f"{path}: not a NumPy archive: {error}") from None
     samples, joints, contacts = (arrays[key].size for key in ("time", "joint_names", "contact_names"))
@@ -141,8 +143,16 @@ def _read_motion(path: Path) -> Motion:
         "contact_point_link": (samples, contacts, 3),
         "external_force": (samples, 3),
         "external_torque": (samples, 3),
+        "joint_velocities": (samples, joints),
+        "joint_torques": (samples, joints),
+        "joint_commands": (samples, joints),
+        "contact_force_disturbed": (samples, contacts, 3),
+        "external_force_disturbed": (samples, 3),
+        "external_torque_disturbed": (samples, 3),
     }
     for name, shape in shapes.items():
+        if name not in arrays:
+            continue
         if arrays[name].shape != shape:
             raise DesignError(f"{path}: {name} has shape {arrays[name].shape}, not {shape}")
         if arrays[name].dtype.kind == "f" and not np.all(np.isfinite(arrays[name])):

@@ -24,6 +24,8 @@ class Perturbation:
         push_start, push_end: s after the motion starts.
         start_shift: (3,) m by which the object starts off its place, world.
         start_turn: (3,) rad, rotation vector by which it starts turned, world.
+        stiffness: factor of the motors' stiffness; they stay as damped, relative to critical, and press as planned.
+        effort: factor of the motors' torque limits.
     """
 
     mass: float = 1.0
@@ -34,6 +36,13 @@ class Perturbation:
     push_end: float = 0.0
     start_shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
     start_turn: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    stiffness: float = 1.0
+    effort: float = 1.0
+
+    @property
+    def displaced(self) -> bool:
+        """Whether the object starts off its place."""
+        return any(self.start_shift) or any(self.start_turn)
 
 
 def draw_perturbation(folder: Folder, seed: int, number: int) -> Perturbation:

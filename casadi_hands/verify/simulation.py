@@ -17,13 +17,12 @@ from casadi_hands.verify.dynamics import object_rotation, shoot
 from casadi_hands.verify.folder import Folder
 from casadi_hands.verify.perturb import Perturbation
 from casadi_hands.verify.trajectory import build_trajectory
-from casadi_hands.verify.wrench import planned_torques
 
 SQUEEZE, RELEASE = 0.3, 0.2
-"""s before the motion: the squeeze builds up while the object is held, then the support fades."""
+"""s before the motion, in which its first commands hold; an object off its place is held there, then let go."""
 
 SUPPORT = 60.0
-"""rad/s, natural frequency of the support on the object's mass; critically damped."""
+"""rad/s, natural frequency of the support that holds a displaced object, on its mass; critically damped."""
 
 
 Observer = Callable[[Any, Any], None]
@@ -41,7 +40,7 @@ def load_mujoco() -> Any:
     # With itself it loads the OpenGL that MUJOCO_GL names, which raises whatever it likes.
     except Exception as error:
         if isinstance(error, ModuleNotFoundError) and error.name == "mujoco":
-            raise HandsError("replay needs MuJoCo: pip install 'casadi-hands[sim]'") from None
+            raise HandsError("replay needs MuJoCo: pip install mujoco") from None
         raise HandsError(
             f"MuJoCo cannot be loaded ({one_line(error)}); try MUJOCO_GL=egl or MUJOCO_GL=osmesa, or MUJOCO_GL=disable "
             "without a video"
@@ -56,17 +55,30 @@ def one_line(error: Exception) -> str:
 class Plan:
     """The motion at every step of the simulation, ``T`` of them from the first sample to the last.
 
+    What the hand is told is linear between samples, as anyone plays it who reads ``motion.npz``.
+
     Attributes:
-        angles, speeds, torques: (T, J) rad, rad/s, and N·m that press the contacts as planned.
+        time: (T,) s.
+        angles, commands: (T, J) rad, planned and told to the motors.
         palm_position, palm_quaternion: (T, 3) m and (T, 4) [w, x, y, z], world.
         external_force, external_torque: (T, 3) what the task itself applies to the object, N and N·m, world.
     """
 
     def __init__(self, folder: Folder, step: float) -> None:
-        """Rebuild the motion ``step`` seconds apart."""
+        """Rebuild the motion ``step`` seconds apart.
+
+        Raises:
+            DesignError: the motion has no commands.
+        """
         motion = folder.motion
+        if motion.joint_commands is None:
+            raise DesignError(
+                f"{folder.path / 'motion.npz'}: no joint_commands, since an earlier version wrote it; "
+                f"`casadi-hands solve {folder.path / 'task.yaml'} --from {folder.path}` makes it anew"
+            )
         path = build_trajectory(folder, shoot(folder))
-        time = np.minimum(np.arange(motion.time[0], motion.time[-1] + step, step), motion.time[-1])
+        steps = np.arange(round((motion.time[-1] - motion.time[0]) / step) + 1)
+        self.time = time = np.minimum(motion.time[0] + step * steps, motion.time[-1])
 
         def dense(values: np.ndarray) -> np.ndarray:
             return np.asarray(make_interp_spline(path.time, values, k=1)(time))
@@ -74,30 +86,36 @@ class Plan:
         def coarse(values: np.ndarray) -> np.ndarray:
             return np.asarray(make_interp_spline(motion.time, values, k=1)(time))
 
-        self.angles, self.speeds = dense(path.joints), dense(path.speeds)
-        self.torques = coarse(planned_torques(folder))
+        self.angles, self.commands = coarse(motion.joint_angles), coarse(motion.joint_commands)
         self.external_force, self.external_torque = coarse(motion.external_force), coarse(motion.external_torque)
-        self.palm_position, self._object_position = dense(path.placed["palm"][1]), dense(path.placed["object"][1])
-        palm, item = (Slerp(path.time, Rotation.from_matrix(path.placed[who][0]))(time) for who in ("palm", "object"))
-        self.palm_quaternion = palm.as_quat(scalar_first=True)
+        self.palm_position, self._object_position = coarse(motion.base_position), dense(path.placed["object"][1])
+        turns = coarse(continuous(motion.base_orientation))
+        self.palm_quaternion = turns / np.linalg.norm(turns, axis=1, keepdims=True)
+        item = Slerp(path.time, Rotation.from_matrix(path.placed["object"][0]))(time)
         self._object_quaternion = item.as_quat(scalar_first=True)
 
     def __len__(self) -> int:
         """Return the number of steps."""
         return len(self.angles)
 
-    def errors(self, first: int, positions: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return distance (m) and angle (deg) of the object's poses, (K, 3) and (K, 4), from its plan.
+    def errors(self, positions: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return distance (m) and angle (deg) of the object's poses, (T, 3) and (T, 4), from its plan.
 
         Args:
-            first: step of the first pose; the others are of the steps that follow.
             positions: m, world.
             quaternions: [w, x, y, z], world.
         """
-        steps = slice(first, first + len(positions))
-        away = np.linalg.norm(positions - self._object_position[steps], axis=1)
-        cosine = np.minimum(np.abs(np.sum(quaternions * self._object_quaternion[steps], axis=1)), 1.0)
+        away = np.linalg.norm(positions - self._object_position, axis=1)
+        cosine = np.minimum(np.abs(np.sum(quaternions * self._object_quaternion, axis=1)), 1.0)
         return away, np.rad2deg(2 * np.arccos(cosine))
+
+
+def continuous(quaternions: np.ndarray) -> np.ndarray:
+    """Return the same orientations (S, 4) with signs such that neighbours lie close to each other."""
+    flips = np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0
+    signs = np.cumprod(np.concatenate([[1.0], np.where(flips, -1.0, 1.0)]))
+    signed: np.ndarray = quaternions * signs[:, None]
+    return signed
 
 
 class Simulation:
@@ -122,6 +140,12 @@ class Simulation:
             raise DesignError(f"{file}: {error}") from None
         self._find(folder, file)
         self._bias = np.asarray(perturbation.joint_bias or np.zeros(len(folder.motion.joint_names)))
+        self._displaced, self._stiffer = perturbation.displaced, perturbation.stiffness
+        driven = self._actuators
+        self.model.actuator_gainprm[driven, 0] *= perturbation.stiffness
+        self.model.actuator_biasprm[driven, 1] *= perturbation.stiffness
+        self.model.actuator_biasprm[driven, 2] *= np.sqrt(perturbation.stiffness)
+        self.model.actuator_forcerange[driven] *= perturbation.effort
         self.model.body_mass[self._object] *= perturbation.mass
         self.model.body_inertia[self._object] *= perturbation.mass
         self.model.geom_friction *= perturbation.friction
@@ -145,8 +169,6 @@ class Simulation:
             raise DesignError(f"{file}: it lacks the object, a link, a joint or an actuator of this hand")
         self._actuators = [driven.index(joint) for joint in joints]
         self._angles = [int(model.jnt_qposadr[joint]) for joint in joints]
-        self._stiffness = model.actuator_gainprm[self._actuators, 0]
-        self._damping = -model.actuator_biasprm[self._actuators, 2]
         free = int(model.body_jntadr[self._object])
         self._pose, self._twist = int(model.jnt_qposadr[free]), int(model.jnt_dofadr[free])
 
@@ -179,14 +201,15 @@ class Simulation:
         return False
 
     def settle(self, plan: Plan, observer: Observer | None) -> None:
-        """Build up the squeeze at the start pose while a soft support holds the object, then let go."""
+        """Squeeze at the start pose; an object off its place is held there by a soft support, which then lets go."""
         for i in range(round((SQUEEZE + RELEASE) / self.step)):
             time = i * self.step
-            force, torque = self._support(1.0 - max(0.0, time - SQUEEZE) / RELEASE)
-            squeeze = min(time / SQUEEZE, 1.0)
-            self._follow(plan, 0, squeeze, moving=False)
+            share = 1.0 - max(0.0, time - SQUEEZE) / RELEASE if self._displaced else 0.0
+            squeeze = min(time / SQUEEZE, 1.0) if self._displaced else 1.0
+            force, torque = self._support(share) if share else (np.zeros(3), np.zeros(3))
             # What the fingers do not bear yet: on its springs alone the object would sag and be gripped there.
             unborne = -(1.0 - squeeze) * self.model.body_mass[self._object] * self.model.opt.gravity
+            self._follow(plan, 0, squeeze)
             self._advance(plan.external_force[0] + force + unborne, plan.external_torque[0] + torque, observer)
 
     def _support(self, share: float) -> tuple[np.ndarray, np.ndarray]:
@@ -218,13 +241,13 @@ class Simulation:
 
     def play(self, plan: Plan, i: int, push: np.ndarray, observer: Observer | None) -> None:
         """Drive the hand as planned for a step, and make it; ``push`` (3,) is a force on the object, N, world."""
-        self._follow(plan, i, 1.0, moving=True)
+        self._follow(plan, i, 1.0)
         self._advance(plan.external_force[i] + push, plan.external_torque[i], observer)
 
-    def _follow(self, plan: Plan, i: int, squeeze: float, moving: bool) -> None:
-        """Set the motors' targets for a step, with a share of the planned torques."""
-        ahead = squeeze * plan.torques[i] + (self._damping * plan.speeds[i] if moving else 0.0)
-        self.data.ctrl[self._actuators] = plan.angles[i] + self._bias + ahead / self._stiffness
+    def _follow(self, plan: Plan, i: int, squeeze: float) -> None:
+        """Set the motors' set points for a step, with a share of what they are ahead of the planned angles."""
+        ahead = squeeze / self._stiffer * (plan.commands[i] - plan.angles[i])
+        self.data.ctrl[self._actuators] = plan.angles[i] + self._bias + ahead
         if self._mocap >= 0:
             self.data.mocap_pos[self._mocap] = plan.palm_position[i]
             self.data.mocap_quat[self._mocap] = plan.palm_quaternion[i]
