@@ -120,6 +120,7 @@ class Design:
         motion: None when no stage has computed one.
         costs: stage -> term -> ``{"weight": w, "value": weighted value}``.
         certificate: figure -> ``{"value": v, "limit": l, "holds": bool}``.
+        replays: one entry for each physics engine that played the design; see ``docs/result-folder.md``.
         stages: one entry for each solver run.
         seconds: wall time by stage, and ``total``.
     """
@@ -131,6 +132,7 @@ class Design:
     motion: Motion | None = None
     costs: dict[str, dict[str, dict[str, float]]] = field(default_factory=dict)
     certificate: dict[str, dict[str, Any]] = field(default_factory=dict)
+    replays: list[dict[str, Any]] = field(default_factory=list)
     stages: list[dict[str, Any]] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=dict)
 
@@ -138,6 +140,19 @@ class Design:
     def missed(self) -> set[str]:
         """The figures of the certificate that do not hold."""
         return {name for name, figure in self.certificate.items() if not figure["holds"]}
+
+    @property
+    def missed_in_replays(self) -> set[str]:
+        """Those of them that replays measured: all else may hold, and the hand still not work."""
+        return {name for name in self.missed if name.startswith("replay_")}
+
+    @property
+    def drops(self) -> int | None:
+        """Perturbed replays that drop the object; all where the one as planned does, None where there were none."""
+        if not self.replays:
+            return None
+        first = self.replays[0]
+        return int(first["of"] if first["dropped_as_planned"] else first["dropped"])
 
     def save(self, directory: str | Path) -> None:
         """Write the result folder; a partial design writes the files for which there is something to write.

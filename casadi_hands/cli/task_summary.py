@@ -44,7 +44,8 @@ def _lines(task: Task) -> Iterator[tuple[str, str]]:
             f"at most {search.max_joints} joints a finger, seed {search.seed}"
         ),
     )
-    changed = {name: value for name, value in task.limits if value != getattr(Limits(), name)}
+    usual = Limits(replay_position=max(0.002, 0.05 * task.object.half_extent))
+    changed = {name: value for name, value in task.limits if value != getattr(usual, name)}
     if changed:
         yield (
             "limits",

@@ -110,6 +110,7 @@ def load_design(directory: Path) -> Design:
         motion=motion,
         costs=record["costs"],
         certificate=record["certificate"],
+        replays=record.get("replays", []),  # earlier versions told of none
         stages=record["stages"],
         seconds=record["seconds"],
     )

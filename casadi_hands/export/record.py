@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -12,6 +13,7 @@ import numpy as np
 
 from casadi_hands.design import Design, Finger, Hand, Link
 from casadi_hands.errors import DesignError
+from casadi_hands.task import task_to_yaml
 
 if TYPE_CHECKING:
     from casadi_hands.task import Task
@@ -33,6 +35,7 @@ def design_record(design: Design) -> dict[str, Any]:
         "status": design.status,
         "reason": design.reason,
         "task": task.name,
+        "task_hash": hashlib.sha256(task_to_yaml(task).encode("utf-8")).hexdigest(),
         "object": {
             "mass": task.object.mass,
             "inertia": np.asarray(task.object.inertia),
@@ -48,6 +51,7 @@ def design_record(design: Design) -> dict[str, Any]:
         "samples": len(design.motion.time) if design.motion else None,
         "costs": design.costs,
         "certificate": design.certificate,
+        "replays": design.replays,
         "stages": design.stages,
         "seconds": design.seconds,
         "versions": _versions(),

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable
 from functools import cached_property, partial
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from casadi_hands.design import Design
-from casadi_hands.errors import HandsError
-from casadi_hands.export.folder import save_design
 from casadi_hands.pipeline.judge import Judge
-from casadi_hands.pipeline.record import Record
+from casadi_hands.pipeline.record import Record, rank_of
 from casadi_hands.pipeline.refine_reason import failing_fingers, refined_reason
 from casadi_hands.pipeline.steps import adopt, run_search, run_shortened, run_whole_hand
 from casadi_hands.reasons import Reason
@@ -28,17 +24,14 @@ from casadi_hands.stages.refine import Refined
 from casadi_hands.stages.refine_values import Margin
 from casadi_hands.stages.sampling import resampled, resampled_model, shortened
 from casadi_hands.stages.whole_hand import WholeHand
-from casadi_hands.verify import replay, replay_many
+from casadi_hands.verify import REPLAYS
 from casadi_hands.verify.report import Audit
-from casadi_hands.verify.simulation import load_mujoco
 
 Array = NDArray[np.float64]
 AMPLE = Margin()
 SMALL = Margin(friction=0.8, normal_force=0.25)
 FIRM = Margin(normal_force=4.0)  # an error of a sensor or of friction shifts a smaller share of it
-REPLAYS = 12  # perturbed ones, that a certified design is tried on; where any drops the object, a firmer grip is
-MOST_DROPS = 3  # where more do so then, too, another hand is
-LONG_DROPS = 6  # likewise, where refining another takes minutes
+LONG_DROPS = 6  # of the replays: where more drop the object, all hands of a structure are tried
 OUT_OF_REACH = 0.3  # half extents that a finger misses its contact by: nothing is left to refine
 SURELY = np.pi / 2  # that an object may turn so that contacts can surely go with it
 # What an exact motion misses only by how it goes between its samples; then it gets more of them.
@@ -71,42 +64,40 @@ class Certifier:
     def run(self, found: Found) -> Design:
         """Refine the best hand, the next best, then hands with one more joint where those failed.
 
-        A certified hand whose replays drop the object makes way for the next best of its structure that does better.
-        All hands of a structure are tried only where no finger may have another joint, or where even the certified ones
-        drop the object more often than not. The record's best design, which may be one from before, is returned.
+        A hand whose files hold and whose replays don't makes way for the next best of its structure that does better.
+        All hands of a structure are tried only where no finger may have another joint, or where even those whose files
+        hold drop the object more often than not. The record's best design, which may be one from before, is returned.
 
         Args:
             found: by the search.
         """
         if found.farthest > OUT_OF_REACH:
             run_whole_hand(self.record, self.model, self.floating, found.candidates[0])
-            return self.record.offer(self.judge.judge(self.record.design, found.short), REPLAYS)
+            return self.record.offer(self.judge.judge(self.record.design, found.short))
         while True:
             failing: set[str] = set()
-            fewest = np.inf  # drops of a certified hand
+            fewest = np.inf  # drops of a hand whose files hold
             for k, candidate in enumerate(found.candidates):
                 may_grow = fewest == np.inf and self._more_joints(found, failing) is not None
                 if k >= HANDS_REFINED and (fewest <= LONG_DROPS or may_grow):
                     break
-                judged, refined, drops = self._certify(candidate, found.short)
-                best = self.record.offer(judged, drops)
-                _, _, share = self._begun
-                if serves(judged, drops, LONG_DROPS if share < 1 else MOST_DROPS):
-                    return best
+                judged, refined = self._certify(candidate, found.short)
+                best = self.record.offer(judged)
                 if judged.status == "certified":
-                    fewest = min(fewest, drops)
-                else:
-                    self.record.say("refine", f"not certified: {judged.reason}")
+                    return best
+                self.record.say("refine", f"not certified: {judged.reason}")
+                if judged.drops is not None:
+                    fewest = min(fewest, judged.drops)
                 failing |= failing_fingers(self.model, refined)
                 if refined.barely_rolls:
                     break  # a structure that must slip will do so in any of its hands
             least = self._more_joints(found, failing)
-            if best.status == "certified" or least is None:
+            if fewest < np.inf or least is None:
                 return best
             self.record.say("synthesis", f"another joint for {', '.join(sorted(failing)) or 'the fingers with fewest'}")
             found = run_search(self.record, self.model, self.search, least)
 
-    def _certify(self, candidate: Candidate, short: tuple[Reason, ...]) -> tuple[Design, Refined, int]:
+    def _certify(self, candidate: Candidate, short: tuple[Reason, ...]) -> tuple[Design, Refined]:
         """Find a hand's motion and refine it; where contacts cannot go with the object, from a shorter one on."""
         model, floating, share = self._begun
         whole = run_whole_hand(self.record, model, floating, candidate)
@@ -153,7 +144,7 @@ class Refiner:
         margin: Margin = AMPLE,
         near: bool = False,
         share: float = 1.0,
-    ) -> tuple[Design, Refined, int]:
+    ) -> tuple[Design, Refined]:
         """Refine one hand with a margin, and with others where that fails.
 
         A small one where no motion is exact, another grip where the audit refuses one that is, a firm one where a
@@ -167,7 +158,7 @@ class Refiner:
             share: of the way to its goals that the motion goes.
 
         Returns:
-            the design, its refinement, and how many of its replays drop the object.
+            the design, replayed where its files hold, and its refinement.
         """
         planned = self.record.design
         stage = Continuation(self.model, whole.contacts, tuple(f.joints for f in whole.fingers), whole.active)
@@ -180,15 +171,14 @@ class Refiner:
             design, regripped, halved = self._between(whole, regripped, stage, short, planned)
             if design.status == "certified":
                 judged, refined, stage = design, regripped, halved
-        drops = self._drops(judged)
-        if drops and refined.margin != FIRM:
-            text = f"again with a firmer grip: {drops} of {REPLAYS} replays dropped the object"
+        judged = self._replayed(judged)
+        if judged.drops and refined.margin != FIRM:
+            text = f"again with a firmer grip: {judged.drops} of {REPLAYS} replays dropped the object"
             firmer = self._regripped(whole, refined, stage, FIRM, text)
-            design = self._judged(stage.model, firmer, short, planned)
-            fewer = self._drops(design) if design.status == "certified" else drops
-            if fewer < drops:
-                return design, firmer, fewer
-        return judged, refined, drops
+            design = self._replayed(self._judged(stage.model, firmer, short, planned))
+            if rank_of(design) < rank_of(judged):
+                return design, firmer
+        return judged, refined
 
     def _between(
         self, whole: WholeHand, refined: Refined, stage: Continuation, short: tuple[Reason, ...], planned: Design
@@ -261,23 +251,17 @@ class Refiner:
         adopt(self.record, model, refined.hand)
         causes = [*short, *refined_reason(model, refined)]
         design = self.judge.judge(self.record.design, causes, None if refined.exact else planned)
-        self.record.offer(design, REPLAYS)
+        self.record.offer(design)
         return design
 
-    def _drops(self, design: Design) -> int:
-        """How many perturbed replays of a certified design drop the object; 0 where there is no simulator to ask."""
+    def _replayed(self, design: Design) -> Design:
+        """The design, replayed if its files hold, and offered again."""
         if design.status != "certified":
-            return 0
-        try:
-            load_mujoco()
-            with self.record.stage("refine", "replays of the certified motion"), tempfile.TemporaryDirectory() as files:
-                save_design(design, Path(files), page=False)
-                if replay(files).dropped:
-                    return REPLAYS
-                return sum(r.dropped for r in replay_many(files, REPLAYS, jobs=self.jobs))
-        except HandsError as error:
-            self.record.say("refine", f"no replays: {error}")
-            return 0
+            return design
+        with self.record.stage("refine", "replays of the motion that holds"):
+            design = self.judge.replayed(design, self.jobs)
+        self.record.offer(design)
+        return design
 
 
 def _within_reach(model: Model) -> float:
@@ -320,8 +304,3 @@ def _excess(design: Design) -> float:
     """How far the worst figure between samples is beyond its limit, over the limit; 0 where all are kept."""
     missed = [design.certificate[name] for name in design.missed & BETWEEN]
     return max((np.inf if f["value"] is None else f["value"] / max(f["limit"], 1e-12) - 1 for f in missed), default=0.0)
-
-
-def serves(design: Design, drops: int, most: int = MOST_DROPS) -> bool:
-    """Whether a design is certified and few of its replays drop the object: another hand costs more than it gains."""
-    return design.status == "certified" and drops <= most

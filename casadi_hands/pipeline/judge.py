@@ -11,11 +11,18 @@ from typing import Any
 
 from casadi_hands.design import Design, Hand, Motion
 from casadi_hands.export.folder import save_design
-from casadi_hands.pipeline.words import friction_reason, missed_figures, speed_reason, torque_reason
+from casadi_hands.pipeline.words import (
+    GRASP_ADVICE,
+    friction_reason,
+    missed_figures,
+    motor_remedy,
+    speed_reason,
+    torque_reason,
+)
 from casadi_hands.reasons import Reason, tell
 from casadi_hands.stages.floating import Floating
 from casadi_hands.stages.model import Model
-from casadi_hands.verify import audit
+from casadi_hands.verify import audit_files, run_replays
 from casadi_hands.verify.report import Audit
 
 # Beyond these, where they are also beyond the limits, a motion is none: lengths in half extents, degrees, m·g.
@@ -47,7 +54,9 @@ class Judge:
         return friction_reason(self.model, self.floating)
 
     def judge(self, design: Design, causes: Sequence[Reason], planned: Design | None = None) -> Design:
-        """The design with the audit's certificate, the status it earns, and the reasons.
+        """The design with the certificate of an audit of its files, the status it earns by that, and the reasons.
+
+        Replays may still take `certified` from it.
 
         Args:
             design: with a hand and a motion.
@@ -65,12 +74,43 @@ class Judge:
         possible = all(self._feasible(name, certificate[name]) for name in FEASIBLE if name in certificate)
         return replace(design, status="feasible" if possible else "failed", reason=reason, certificate=certificate)
 
+    def replayed(self, design: Design, jobs: int = 1) -> Design:
+        """The design with what replays in MuJoCo say of it: more figures, and the status and reason that follow.
+
+        Args:
+            design: judged before.
+            jobs: processes for the replays.
+        """
+        with tempfile.TemporaryDirectory() as files:
+            save_design(design, Path(files), page=False)
+            tried = run_replays(files, jobs=jobs)
+        figures = {figure.name: figure for figure in tried.figures()}
+        seen = Audit(design.task.name, figures, ())
+        judged = replace(design, certificate={**design.certificate, **seen.as_certificate()}, replays=[tried.record()])
+        if design.status != "certified" or seen.certified:
+            return judged
+        lost = tried.dropped_before()
+        causes = [] if lost is None else [Reason(f"{lost}, with nothing perturbed", GRASP_ADVICE, frozenset(figures))]
+        return replace(judged, status="feasible", reason=tell(causes, missed_figures(design, seen)))
+
+    def concluded(self, design: Design, jobs: int = 1) -> Design:
+        """The design as it is handed over: replayed, and where motors keep it from its goals, told which would do."""
+        if design.status == "failed" or design.hand is None or design.motion is None:
+            return design
+        judged = design if design.replays else self.replayed(design, jobs)
+        if not judged.missed_in_replays or judged.missed != judged.missed_in_replays:
+            return judged
+        with tempfile.TemporaryDirectory() as files:
+            save_design(judged, Path(files), page=False)
+            remedy = motor_remedy(files, judged)
+        return judged if remedy is None else replace(judged, reason=f"{judged.reason}. {remedy}")
+
     def audited(self, design: Design) -> Audit:
         """What the audit finds in a design's files; of the same hand and motion as the last time, what it found."""
         if self._last is None or self._last[0] is not design.hand or self._last[1] is not design.motion:
             with tempfile.TemporaryDirectory() as scratch:
                 save_design(design, Path(scratch), page=False)
-                self._last = design.hand, design.motion, audit(scratch)
+                self._last = design.hand, design.motion, audit_files(scratch)
         return self._last[2]
 
     def _feasible(self, name: str, figure: dict[str, Any]) -> bool:

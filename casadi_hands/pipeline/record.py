@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -31,6 +32,13 @@ class Progress:
     elapsed: float
 
 
+def rank_of(design: Design) -> tuple[float, ...]:
+    """How far a judged design is from certified, best first: limits missed by the files, in replays, and drops."""
+    in_replays = design.missed_in_replays
+    missed = len(design.missed) - len(in_replays)
+    return (missed, math.inf, math.inf) if design.drops is None else (missed, len(in_replays), design.drops)
+
+
 class Record:
     """The design as it grows, with every solver run and all time spent, whichever design is returned in the end.
 
@@ -44,7 +52,7 @@ class Record:
         self.task, self.out, self.report = task, out, report
         self.started = time.perf_counter()
         self.design = Design(task=task, status="failed", reason="nothing has been computed yet")
-        self._best: tuple[tuple[int, int], Design] | None = None
+        self._best: tuple[tuple[float, ...], Design] | None = None
 
     def say(self, stage: str, text: str) -> None:
         """Report progress."""
@@ -82,17 +90,17 @@ class Record:
         seconds = {**self.design.seconds, "total": time.perf_counter() - self.started}
         return replace(design, stages=self.design.stages, seconds=seconds)
 
-    def offer(self, design: Design, drops: int) -> Design:
+    def offer(self, design: Design) -> Design:
         """Take a judged design for the best if it misses less than the best so far, and write it.
 
         Args:
-            design: with its certificate; what misses fewer limits is better, of equals what is dropped less.
-            drops: how many replays drop its object, as many as there are where that is not known yet.
+            design: with its certificate; what misses fewer limits of the audit is better, of equals what misses fewer
+                in replays (all, where they were not run), then what is dropped less.
 
         Returns:
             the best design so far.
         """
-        rank = len(design.missed), drops
+        rank = rank_of(design)
         if self._best is None or rank < self._best[0]:
             self._best = rank, design
             self.keep(design)

@@ -14,7 +14,7 @@ import numpy as np
 
 from casadi_hands.design import Design
 from casadi_hands.errors import SolveError
-from casadi_hands.pipeline.certify import REPLAYS, Certifier, Refiner, serves
+from casadi_hands.pipeline.certify import Certifier, Refiner
 from casadi_hands.pipeline.judge import Judge
 from casadi_hands.pipeline.record import STAGES, Progress, Record
 from casadi_hands.pipeline.steps import adopt, prepare_search, run_floating, run_search, run_whole_hand
@@ -87,13 +87,12 @@ def _refine_again(record: Record, start: Path) -> Design | None:
     adopt(record, model, whole)
     judge = Judge(model, as_floating(model, whole))
     # Replays of one hand take about as long as other processes take to start.
-    design, _, drops = Refiner(record, model, judge, jobs=1).certify(whole, (), margin, near=True)
+    design, _ = Refiner(record, model, judge, jobs=1).certify(whole, (), margin, near=True)
     record.update(stages=[{**run, "started_from": str(start)} for run in record.design.stages])
-    record.offer(design, drops)
-    if serves(design, drops):
+    record.offer(design)
+    if design.status == "certified":
         return design
-    why = design.reason or f"{drops} of {REPLAYS} replays dropped the object"
-    record.say("refine", f"from the earlier result no hand serves: {why}; now all stages")
+    record.say("refine", f"from the earlier result no hand is certified: {design.reason}; now all stages")
     record.update(hand=None, motion=None, costs={})
     return None
 
@@ -115,7 +114,7 @@ def _run(record: Record, until: str, executor: Executor | None, jobs: int) -> De
     if until == "whole_hand":
         run_whole_hand(record, model, floating, found.candidates[0])
         return judge.judge(record.design, found.short)
-    return Certifier(record, model, floating, search, judge, jobs).run(found)
+    return judge.concluded(Certifier(record, model, floating, search, judge, jobs).run(found), jobs)
 
 
 def _stopped(design: Design, stage: str) -> Design:

@@ -7,12 +7,14 @@ import re
 import numpy as np
 
 from casadi_hands.design import Design, Hand
+from casadi_hands.export.motors import joint_motors
 from casadi_hands.pipeline.holding import HELD, MOST_GRIP, grips, least_friction, least_torque
 from casadi_hands.reasons import Reason
 from casadi_hands.search.shortcoming import WITHOUT_CONTACT, moment
 from casadi_hands.stages.floating import Floating
 from casadi_hands.stages.model import Model
 from casadi_hands.verify import Audit
+from casadi_hands.verify.replays import stronger_motors
 from casadi_hands.verify.report import Figure, show
 
 # Figures that follow where the hand cannot grip: a refinement in vain ends anywhere.
@@ -86,6 +88,7 @@ def speed_reason(model: Model, design: Design) -> Reason | None:
 
 # The audit's figures.
 
+GRASP_ADVICE = "more friction, more fingers, or contacts that surround the object better"
 _ADVICE = {
     "structure": "solving the task again",
     "goal_position": "goals within reach, or limits.goal_position as wide as you can accept",
@@ -103,6 +106,9 @@ _ADVICE = {
     "torque": "stronger motors (actuator.torque) or a lighter object",
     "unsupplied_force": "more joints (search.max_joints)",
     "disturbance_radius": "more fingers, or contacts farther apart",
+    "replay_position": "another seed (--seed), more fingers, or limits.replay_position as wide as you can accept",
+    "replay_angle": "a finger off the line between two contacts, or limits.replay_angle as wide as you can accept",
+    "replay_dropped": GRASP_ADVICE,
 }
 
 
@@ -115,6 +121,31 @@ def missed_figures(design: Design, verdict: Audit) -> list[tuple[str, Reason]]:
         what = "; ".join(verdict.problems) if name == "structure" else _with_limit(design, figure)
         missed.append((name, Reason(what, _ADVICE.get(name, "another seed (--seed)"))))
     return missed
+
+
+def motor_remedy(directory: str, design: Design) -> str | None:
+    """Which motors would bring a design through its replay as planned, where weak or soft ones keep it from that.
+
+    Args:
+        directory: the design's files.
+        design: that misses limits in replays.
+    """
+    limits, hand = design.task.limits, design.hand
+    assert hand is not None
+    stiffest = max(motor.stiffness for motor in joint_motors(design.task, hand))
+    for change, seen in stronger_motors(directory):
+        near = all(
+            goal.position <= limits.replay_position and (goal.angle is None or goal.angle <= limits.replay_angle)
+            for goal in seen.goals
+        )
+        if near and not seen.dropped:
+            motors = f"motors of {change.effort * hand.effort:.3g} N·m (actuator.torque)"
+            if change.stiffness > 1:
+                motors += (
+                    f" that are {change.stiffness:g} times as stiff, up to {change.stiffness * stiffest:.3g} N·m/rad,"
+                )
+            return f"With {motors} the same hand reaches every goal there"
+    return None
 
 
 def _with_limit(design: Design, figure: Figure) -> str:

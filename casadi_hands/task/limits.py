@@ -38,3 +38,9 @@ class Limits(Section):
         description="Least size of the smallest wrench the grasp cannot resist, over weight. 0 asks for none: two "
         "point contacts can never resist a spin about the line through them.",
     )
+    replay_position: NonNegative = Field(
+        description="Distance of object (or tool) and any goal when the design is replayed as planned, m.",
+        json_schema_extra={"default": "the larger of 2 mm and 5 % of the object's half extent"},
+    )
+    replay_angle: NonNegative = Field(default=5.0, description="Angle between object and any goal then, degrees.")
+    replay_dropped: NonNegative = Field(default=0.1, description="Share of perturbed replays that drop the object.")

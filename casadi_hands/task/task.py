@@ -55,7 +55,7 @@ class Task(Section):
     perturbations: tuple[Perturbation, ...] = Field(default=(), description="Disturbances that the grasp must stand.")
     hand: HandSpec = Field(default={}, validate_default=True, description="What fingers can be built.")
     actuator: Actuator | None = Field(default=None, description="The motors; without it torque and speed are free.")
-    limits: Limits = Field(default=Limits(), description="Limits of the certificate.")
+    limits: Limits = Field(default={}, validate_default=True, description="Limits of the certificate.")
     search: Search = Field(default=Search(), description="The search over structures.")
     weights: Weights = Field(default=Weights(), description="Weights of the soft stages' cost terms.")
 
@@ -98,6 +98,12 @@ class Task(Section):
             reach = palm.radius + _farthest_contact(palm, fingers, goals, info.data.get("tool"))
             length = (2.0 * radius, max(2.0 * radius, reach))
         return {**value, "link_length": length}
+
+    @field_validator("limits", mode="before")
+    @classmethod
+    def _limits_defaults(cls, value: Any, info: ValidationInfo) -> Any:
+        body = info.data.get("object")
+        return fill(value, replay_position=max(0.002, 0.05 * body.half_extent) if body else 1.0)
 
     @property
     def draws(self) -> bool:

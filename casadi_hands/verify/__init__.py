@@ -1,8 +1,21 @@
 """The witness: recompute a finished design from its files, sharing no formula with the optimiser."""
 
-from casadi_hands.verify.audit import audit
+from casadi_hands.verify.audit import audit, audit_files
 from casadi_hands.verify.perturb import Perturbation
 from casadi_hands.verify.replay import Replay, replay, replay_many
+from casadi_hands.verify.replays import REPLAYS, Replays, run_replays
 from casadi_hands.verify.report import Audit, Figure
 
-__all__ = ["Audit", "Figure", "Perturbation", "Replay", "audit", "replay", "replay_many"]
+__all__ = [
+    "REPLAYS",
+    "Audit",
+    "Figure",
+    "Perturbation",
+    "Replay",
+    "Replays",
+    "audit",
+    "audit_files",
+    "replay",
+    "replay_many",
+    "run_replays",
+]

@@ -6,6 +6,7 @@ physics integrated anew (see ``dynamics``), the motion between samples rebuilt f
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,14 +22,38 @@ from casadi_hands.verify.contact import (
 from casadi_hands.verify.dynamics import Shots, between_residual, sample_residual, shoot
 from casadi_hands.verify.folder import Folder, read_folder
 from casadi_hands.verify.goals import goal_figures
+from casadi_hands.verify.replays import REPLAYS, run_replays
 from casadi_hands.verify.report import Audit, Figure
 from casadi_hands.verify.structure import structure_problems
 from casadi_hands.verify.trajectory import build_trajectory, sample_placements
 from casadi_hands.verify.wrench import disturbance_figure, torque_figure, unsupplied_figure
 
 
-def audit(directory: str | Path) -> Audit:
+def audit(directory: str | Path, *, replays: int = REPLAYS, jobs: int = 1) -> Audit:
     """Recompute every figure of a result folder and hold it against the task's limits.
+
+    Args:
+        directory: the result folder.
+        replays: perturbed replays, beside one as planned, where all else holds; 0 for no replays at all.
+        jobs: processes for them; the outcome does not depend on it.
+
+    Raises:
+        DesignError: a file is missing or cannot be read as the format says.
+        TaskError: ``task.yaml`` is not a task.
+        HandsError: MuJoCo cannot be loaded.
+    """
+    found = audit_files(directory)
+    if not replays or not found.certified:
+        return found
+    figures = run_replays(directory, replays, jobs=jobs).figures()
+    return replace(found, figures={**found.figures, **{figure.name: figure for figure in figures}})
+
+
+def audit_files(directory: str | Path) -> Audit:
+    """Recompute the figures that need no physics engine.
+
+    Args:
+        directory: the result folder.
 
     Raises:
         DesignError: a file is missing or cannot be read as the format says.

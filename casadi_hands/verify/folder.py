@@ -115,7 +115,8 @@ def read_folder(directory: str | Path) -> Folder:
 
 
 def _read_motion(path: Path) -> Motion:
-    names, optional = [], []
+    names: list[str] = []
+    optional: list[str] = []
     for name, item in Motion.__dataclass_fields__.items():
         (optional if item.default is None else names).append(name)
     try:

@@ -39,6 +39,9 @@ from casadi_hands.verify.simulation import Observer, Plan, Simulation
 DROP = 0.5
 """Share of half the object's extent by which it may be off its plan before it counts as dropped."""
 
+GONE = 4.0
+"""Of half the extent: an object that is so far off is not followed any farther."""
+
 
 @dataclass(frozen=True)
 class GoalError:
@@ -191,6 +194,9 @@ class Player:
             pushed = perturbation.push_start <= i * scene.step < perturbation.push_end
             scene.play(plan, i, np.asarray(perturbation.push) if pushed else np.zeros(3), observer)
             positions[i + 1], quaternions[i + 1] = scene.object_pose()
+            if plan.distance(i + 1, positions[i + 1]) > GONE * folder.length:
+                positions[i + 2 :], quaternions[i + 2 :] = positions[i + 1], quaternions[i + 1]
+                break
         errors = np.stack(plan.errors(positions, quaternions), axis=1)
         due = [c for c in range(len(folder.motion.contact_names)) if folder.motion.contact_active[-1, c]]
         lost = [c for c in due if not scene.touches(folder.motion.contact_link[c])]

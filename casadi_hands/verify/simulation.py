@@ -98,6 +98,10 @@ class Plan:
         """Return the number of steps."""
         return len(self.angles)
 
+    def distance(self, i: int, position: np.ndarray) -> float:
+        """Return how far (m) a position (3,), world, is from the object's plan at a step."""
+        return float(np.linalg.norm(position - self._object_position[i]))
+
     def errors(self, positions: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return distance (m) and angle (deg) of the object's poses, (T, 3) and (T, 4), from its plan.
 
