@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 from casadi_hands.design import Design
-from casadi_hands.errors import HandsError
 from casadi_hands.pipeline import certify
-from casadi_hands.pipeline.certify import AMPLE, FIRM, REPLAYS, Certifier, Refiner, intervals_to_halve
+from casadi_hands.pipeline.certify import AMPLE, FIRM, Certifier, Refiner, intervals_to_halve
 from casadi_hands.pipeline.record import Record
 from casadi_hands.search.algorithm import Candidate, Found
 from casadi_hands.stages.model import build_model
@@ -21,6 +20,7 @@ from casadi_hands.stages.refine import Run, Worst
 from casadi_hands.stages.refine_values import Margin
 from casadi_hands.task import parse_task
 from casadi_hands.verify.report import Audit, Figure
+from tests.pipeline.replayed import replayed
 from tests.search.example import ball_target, ball_task, hand, pointing
 from tests.stages.example import made_up_solution
 
@@ -71,11 +71,8 @@ class Loop(Certifier):
         certificate = {str(i): {"holds": i >= missed} for i in range(9)}
         status = "failed" if missed else "certified"
         words = f"attempt {len(self.tried)}"
-        return (
-            replace(self.record.design, status=status, reason=words, certificate=certificate),
-            refined,
-            self.dropped[len(self.tried) - 1],
-        )
+        judged = replace(self.record.design, status=status, reason=words, certificate=certificate)
+        return judged if missed else replayed(judged, self.dropped[len(self.tried) - 1]), refined
 
 
 def test_the_first_certified_hand_is_returned(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -87,7 +84,7 @@ def test_the_first_certified_hand_is_returned(monkeypatch: pytest.MonkeyPatch) -
 def test_a_certified_hand_that_drops_the_object_makes_way_for_one_that_drops_it_less(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    cases = (([12, 0], 2, 2), ([12, 5], 2, 2), ([5, 12], 1, 2), ([4, 0], 2, 2), ([3, 0], 1, 1))
+    cases = (([12, 0], 2, 2), ([12, 5], 2, 2), ([5, 12], 1, 2), ([2, 0], 2, 2), ([1, 0], 1, 1))
     # Those that drop it more often than not make way for all the others.
     for dropped, best, tried in (*cases, ([12, 7, 3], 3, 3), ([12, 7, 8], 2, 3), ([8, 6, 0], 2, 2)):
         loop = Loop(monkeypatch, 3 * [(0, "", False)], max_joints=3)
@@ -96,16 +93,6 @@ def test_a_certified_hand_that_drops_the_object_makes_way_for_one_that_drops_it_
         assert len(loop.tried) == tried
     # Another structure is not tried: it would be no better held between the same contacts.
     assert loop.least == []
-
-
-@pytest.mark.parametrize(("dropped", "tried"), [([5, 0], 1), ([6, 0], 1), ([7, 0], 2)])
-def test_where_a_motion_has_to_be_lengthened_only_a_hand_that_drops_more_often_than_not_makes_way(
-    monkeypatch: pytest.MonkeyPatch, dropped: list[int], tried: int
-) -> None:
-    loop = Loop(monkeypatch, [(0, "", False), (0, "", False)], max_joints=3)
-    loop.dropped, loop.__dict__["_begun"] = dropped, (None, None, 0.5)
-    loop.run(found((1, 1), (1, 1), (1, 1)))
-    assert len(loop.tried) == tried
 
 
 def test_the_finger_that_failed_gets_a_joint_until_none_may(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -154,9 +141,8 @@ def test_a_design_there_is_already_is_returned_where_no_hand_is_better(monkeypat
         loop.dropped = [0, 0]
         status = "failed" if known[0] else "certified"
         certificate = {str(i): {"holds": i >= known[0]} for i in range(9)}
-        loop.record.offer(
-            replace(loop.record.design, status=status, reason="attempt 0", certificate=certificate), known[1]
-        )
+        judged = replace(loop.record.design, status=status, reason="attempt 0", certificate=certificate)
+        loop.record.offer(judged if known[0] else replayed(judged, known[1]))
         design = loop.run(found((1, 1), (1, 1)))
         assert design.reason == f"attempt {best}"
 
@@ -166,22 +152,8 @@ def test_a_design_there_is_already_is_better_than_a_hand_far_from_its_contacts(
 ) -> None:
     loop = Loop(monkeypatch, [], max_joints=3)
     known = replace(loop.record.design, status="certified", reason="known")
-    loop.record.offer(known, REPLAYS)
+    loop.record.offer(known)
     assert loop.run(found((1, 1), farthest=0.31)).reason == "known"
-
-
-def test_a_simulator_that_cannot_be_loaded_costs_no_certified_design(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail() -> None:
-        raise HandsError("MuJoCo cannot be loaded (no screen)")
-
-    told: list[str] = []
-    task = ball_task()
-    record = Record(task, None, lambda progress: told.append(progress.text))
-    anything: Any = None
-    monkeypatch.setattr(certify, "load_mujoco", fail)
-    refiner = Refiner(record, build_model(task), anything, 1)
-    assert refiner._drops(replace(record.design, status="certified")) == 0
-    assert told == ["no replays: MuJoCo cannot be loaded (no screen)"]
 
 
 def test_what_a_firmer_grip_changes_is_told_from_the_hand_before_any_refinement(
@@ -255,13 +227,12 @@ def test_what_is_missed_only_between_samples_gets_more_of_them(
     monkeypatch.setattr(certify, "resampled", lambda hand, before, after: hand)
     monkeypatch.setattr(Refiner, "_attempt", lambda self, whole, margin, way: way(margin=margin))
     monkeypatch.setattr(Refiner, "_judged", judged)
-    monkeypatch.setattr(Refiner, "_drops", lambda self, design: 0)
+    monkeypatch.setattr(Refiner, "_replayed", lambda self, design: design)
     judge: Any = SimpleNamespace(audited=audited)
     whole: Any = SimpleNamespace(contacts=(0, 1), fingers=(), active=None)
-    design, _, drops = Refiner(Record(ball_task(), None, lambda _: None), model, judge, 1).certify(whole, ())
+    design, _ = Refiner(Record(ball_task(), None, lambda _: None), model, judge, 1).certify(whole, ())
     assert [len(samples) - len(tried[0]) for samples in tried] == [0, 2, 4][: 1 + again]
     assert design.status == ("certified" if again else "feasible")
-    assert drops == 0
 
 
 class Ways:
@@ -303,13 +274,17 @@ def refine(
     monkeypatch.setattr(certify, "Continuation", lambda *_: ways)
     monkeypatch.setattr(Refiner, "_attempt", lambda self, whole, margin, way: way(margin=margin))
     monkeypatch.setattr(Refiner, "_judged", lambda self, *_: replace(self.record.design, status=next(judged)))
-    monkeypatch.setattr(Refiner, "_drops", lambda self, design: next(dropped) if design.status == "certified" else 0)
+
+    def played(self: Refiner, design: Design) -> Design:
+        return replayed(design, next(dropped)) if design.status == "certified" else design
+
+    monkeypatch.setattr(Refiner, "_replayed", played)
     whole: Any = SimpleNamespace(contacts=(0, 1), fingers=(), active=None)
     record, unused = Record(ball_task(), None, lambda _: None), SimpleNamespace()
     refiner = Refiner(record, unused, unused, 1)  # type: ignore[arg-type]
-    _, refined, least = refiner.certify(whole, (), share=share)
+    design, refined = refiner.certify(whole, (), share=share)
     assert (next(judged, None), next(dropped, None)) == (None, None)
-    return refined.margin, least
+    return refined.margin, design.drops or 0
 
 
 @pytest.mark.parametrize("share", [1.0, 0.5])

@@ -9,6 +9,7 @@ import pytest
 
 from casadi_hands.design import Design
 from casadi_hands.pipeline.record import Progress, Record
+from tests.pipeline.replayed import replayed
 from tests.search.example import ball_task
 from tests.stages.example import made_up_solution
 
@@ -77,7 +78,7 @@ def test_nothing_unfinished_takes_the_place_of_a_judged_design(tmp_path: Path) -
     kept = record([], tmp_path)
     kept.keep_unfinished("stopped early")
     assert Design.load(tmp_path).reason == "stopped early"
-    kept.offer(replace(kept.design, status="feasible", reason="slips a little"), 12)
+    kept.offer(replace(kept.design, status="feasible", reason="slips a little"))
     kept.keep_unfinished("stopped while another hand was tried")
     loaded = Design.load(tmp_path)
     assert (loaded.status, loaded.reason) == ("feasible", "slips a little")
@@ -86,13 +87,14 @@ def test_nothing_unfinished_takes_the_place_of_a_judged_design(tmp_path: Path) -
 def test_the_best_design_is_written_as_soon_as_it_is_known(tmp_path: Path) -> None:
     kept = record([], tmp_path)
 
-    def judged(reason: str, *missed: str) -> Design:
-        return replace(kept.design, reason=reason, certificate={name: {"holds": False} for name in missed})
+    def judged(reason: str, missed: tuple[str, ...], drops: int | None) -> Design:
+        design = replace(kept.design, reason=reason, certificate={name: {"holds": False} for name in missed})
+        return design if drops is None else replayed(design, drops)
 
-    offers = (("two", ("slip", "gap"), 12), ("one", ("gap",), 12), ("worse", ("slip", "gap"), 0))
-    offers += ("none", (), 12), ("equal", (), 12), ("fewer drops", (), 3), ("more", (), 5)
+    offers = (("two", ("slip", "gap"), None), ("one", ("gap",), None), ("worse", ("slip", "gap"), 0))
+    offers += ("none", (), None), ("equal", (), None), ("fewer drops", (), 3), ("more", (), 5), ("held", (), 0)
     best = []
     for reason, missed, drops in offers:
-        best.append(kept.offer(judged(reason, *missed), drops).reason)
+        best.append(kept.offer(judged(reason, missed, drops)).reason)
         assert Design.load(tmp_path).reason == best[-1]
-    assert best == ["two", "one", "one", "none", "none", "fewer drops", "fewer drops"]
+    assert best == ["two", "one", "one", "none", "none", "fewer drops", "fewer drops", "held"]

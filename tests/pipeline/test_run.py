@@ -12,9 +12,10 @@ import pytest
 from casadi_hands.design import Design
 from casadi_hands.errors import DesignError, SolveError
 from casadi_hands.pipeline import Progress, run, solve
-from casadi_hands.pipeline.certify import FIRM, REPLAYS, Refiner
+from casadi_hands.pipeline.certify import FIRM, Refiner
 from casadi_hands.pipeline.record import Record
 from casadi_hands.task import parse_task
+from tests.pipeline.replayed import replayed
 from tests.pipeline.test_warm import HELD, earlier, edited, pressing
 
 
@@ -29,14 +30,18 @@ def refined_as(monkeypatch: pytest.MonkeyPatch, status: str, drops: int) -> list
     """Let refinements end with a status and dropped replays; the calls they get."""
     calls: list[dict[str, Any]] = []
 
-    def certify(self: Refiner, whole: Any, short: Any, margin: Any, near: bool) -> tuple[Design, Any, int]:
+    def certify(self: Refiner, whole: Any, short: Any, margin: Any, near: bool) -> tuple[Design, Any]:
         calls.append(
             {"whole": whole, "short": short, "margin": margin, "near": near, "motion": self.record.design.motion}
         )
         self.record.add_runs([{"stage": "refine", "seconds": 0.0}])
         reason = "" if status == "certified" else "too far"
         certificate = {"slip": {"holds": status == "certified"}}
-        return replace(self.record.design, status=status, reason=reason, certificate=certificate), None, drops
+        design = replace(self.record.design, status=status, reason=reason, certificate=certificate)
+        if status == "certified":
+            design = replayed(design, drops)
+            design = replace(design, reason=f"{drops} drops" if design.status == "feasible" else "")
+        return design, None
 
     monkeypatch.setattr(Refiner, "certify", certify)
     return calls
@@ -72,7 +77,7 @@ def test_the_folder_that_is_written_may_be_the_start(folder: Path, monkeypatch: 
 
 @pytest.mark.parametrize(
     ("status", "drops", "words"),
-    [("feasible", 0, "no hand serves: too far; now"), ("certified", 5, "5 of 12 replays dropped the")],
+    [("feasible", 0, "no hand is certified: too far; now"), ("certified", 5, "no hand is certified: 5 drops")],
 )
 def test_where_it_does_not_serve_all_stages_are_run_and_know_of_it(
     status: str, drops: int, words: str, folder: Path, monkeypatch: pytest.MonkeyPatch
@@ -83,13 +88,13 @@ def test_where_it_does_not_serve_all_stages_are_run_and_know_of_it(
         # Without the earlier hand, which is not that of the motions to come.
         assert (record.design.hand, record.design.motion) == (None, None)
         worse = {"slip": {"holds": False}, "gap": {"holds": False}}
-        return record.offer(replace(record.design, certificate=worse), 0)
+        return record.offer(replace(record.design, certificate=worse))
 
     monkeypatch.setattr(run, "_run", all_stages)
     news: list[Progress] = []
     design = solve(parse_task(HELD), jobs=1, start=folder, progress=news.append)
     assert design.hand is not None
-    assert design.status == status
+    assert design.status == "feasible"
     assert any(words in word.text for word in news)
 
 
@@ -118,7 +123,7 @@ def test_where_numbers_break_down_the_best_design_so_far_is_the_result(
     assert design.status == "failed"
     assert "the solve broke off: SVD did not converge" in design.reason
     assert Design.load(tmp_path / "out").reason == design.reason
-    refined_as(monkeypatch, "certified", REPLAYS)
+    refined_as(monkeypatch, "certified", 1)
     design = solve(parse_task(HELD), jobs=1, start=folder, out=tmp_path / "out")
     assert design.status == "certified"
     assert Design.load(tmp_path / "out").status == "certified"
