@@ -18,7 +18,7 @@ from casadi_hands.verify.report import show
 if TYPE_CHECKING:
     from casadi_hands.alternatives import Alternative
     from casadi_hands.design import Design
-    from casadi_hands.verify import Audit, Replay
+    from casadi_hands.verify import Audit, Replay, Replays
 
 _STYLES = {"certified": "bold green", "feasible": "bold yellow", "failed": "bold red"}
 
@@ -67,7 +67,8 @@ def alternatives_summary(ranked: Sequence[Alternative], folder: Path) -> Rendera
 def audit_summary(found: Audit) -> RenderableType:
     """The figures of an audit and what is wrong."""
     headline = _headline(found.name, "certified" if found.certified else "not certified")
-    return Group(headline, certificate_table(found.as_certificate()), *(Text(f"- {why}") for why in found.reasons))
+    lines = [Text(f"- {why}") for why in found.reasons] + [Text(f"note: {note}") for note in found.notes]
+    return Group(headline, certificate_table(found.as_certificate()), *lines)
 
 
 def certificate_table(certificate: Mapping[str, Mapping[str, Any]]) -> Table:
@@ -90,8 +91,9 @@ def certificate_table(certificate: Mapping[str, Mapping[str, Any]]) -> Table:
     return table
 
 
-def replay_summary(nominal: Replay, perturbed: Sequence[Replay]) -> RenderableType:
-    """Errors of the replay as planned and of those perturbed ones that kept the object."""
+def replay_summary(played: Replays) -> RenderableType:
+    """Errors of the replay as planned, at the goals too, and of those perturbed ones that kept the object."""
+    nominal, perturbed = played.nominal, played.perturbed
     table = Table(box=SIMPLE_HEAD, collapse_padding=True, pad_edge=False)
     table.add_column("", no_wrap=True)
     for column in ("mean mm", "max mm", "end mm", "mean deg", "max deg", "end deg"):
@@ -107,8 +109,12 @@ def replay_summary(nominal: Replay, perturbed: Sequence[Replay]) -> RenderableTy
         table,
         Text(f"as planned: {'dropped' if nominal.dropped else 'not dropped'}{lost}"),
     ]
+    for number, goal in enumerate(nominal.goals, start=1):
+        angle = "" if goal.angle is None else f", {goal.angle:.3g} deg"
+        parts.append(Text(f"from goal {number}: {1e3 * goal.position:.3g} mm{angle}"))
     if perturbed:
         parts.append(Text(f"perturbed: dropped in {len(perturbed) - len(held)} of {len(perturbed)}"))
+    parts += [Text(f"- {figure.reason}") for figure in played.figures() if not figure.holds]
     return Group(*parts)
 
 

@@ -12,11 +12,21 @@ from casadi_hands.export.arrays import load_motion, save_motion
 from casadi_hands.export.commands import commanded
 from casadi_hands.export.mjcf import scene_mjcf
 from casadi_hands.export.record import FORMAT, STATUSES, design_record, hand_from_record, record_text
+from casadi_hands.export.table import motion_table
 from casadi_hands.export.urdf import hand_urdf, object_urdf
 from casadi_hands.task import load_task, task_to_yaml
 from casadi_hands.view.page import write_page
 
-_FILES = ("task.yaml", "hand.urdf", "object.urdf", "scene.xml", "motion.npz", "result.json", "viewer.html")
+_FILES = (
+    "task.yaml",
+    "hand.urdf",
+    "object.urdf",
+    "scene.xml",
+    "motion.npz",
+    "motion.csv",
+    "result.json",
+    "viewer.html",
+)
 _ENTRIES = ("status", "reason", "hand", "samples", "costs", "certificate", "stages", "seconds")
 
 
@@ -29,7 +39,7 @@ def save_design(design: Design, directory: Path, page: bool = True) -> None:
     Args:
         design: whole or partial (hand or motion None).
         directory: made if it does not exist.
-        page: write the viewer too, which takes longer than all the rest.
+        page: write the viewer and the motion as a table too, which takes longer than all the rest.
 
     Raises:
         DesignError: the folder cannot be written, or the design holds what cannot be.
@@ -58,6 +68,8 @@ def _write(design: Design, directory: Path, page: bool) -> None:
         (directory / name).write_text(text, encoding="utf-8")
     if motion is not None:
         save_motion(motion, directory / "motion.npz")
+        if page:  # for people, as the page is
+            (directory / "motion.csv").write_text(motion_table(motion), encoding="utf-8")
     if page:
         write_page(design, directory / "viewer.html")
     (directory / "result.json").write_text(record_text(design_record(design)), encoding="utf-8")

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from casadi_hands.task import load_task
 from casadi_hands.verify.clearance import joint_figures, penetration_figure
 from casadi_hands.verify.contact import (
     friction_figures,
@@ -29,11 +30,12 @@ from casadi_hands.verify.trajectory import build_trajectory, sample_placements
 from casadi_hands.verify.wrench import disturbance_figure, torque_figure, unsupplied_figure
 
 
-def audit(directory: str | Path, *, replays: int = REPLAYS, jobs: int = 1) -> Audit:
+def audit(directory: str | Path, *, task: str | Path | None = None, replays: int = REPLAYS, jobs: int = 1) -> Audit:
     """Recompute every figure of a result folder and hold it against the task's limits.
 
     Args:
         directory: the result folder.
+        task: file of a task that is trusted, to judge by in place of the folder's.
         replays: perturbed replays, beside one as planned, where all else holds; 0 for no replays at all.
         jobs: processes for them; the outcome does not depend on it.
 
@@ -42,18 +44,19 @@ def audit(directory: str | Path, *, replays: int = REPLAYS, jobs: int = 1) -> Au
         TaskError: ``task.yaml`` is not a task.
         HandsError: MuJoCo cannot be loaded.
     """
-    found = audit_files(directory)
+    found = audit_files(directory, task)
     if not replays or not found.certified:
         return found
-    figures = run_replays(directory, replays, jobs=jobs).figures()
+    figures = run_replays(directory, replays, jobs=jobs).figures(None if task is None else load_task(task))
     return replace(found, figures={**found.figures, **{figure.name: figure for figure in figures}})
 
 
-def audit_files(directory: str | Path) -> Audit:
+def audit_files(directory: str | Path, task: str | Path | None = None) -> Audit:
     """Recompute the figures that need no physics engine.
 
     Args:
         directory: the result folder.
+        task: file of a task that is trusted, to judge by in place of the folder's.
 
     Raises:
         DesignError: a file is missing or cannot be read as the format says.

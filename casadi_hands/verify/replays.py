@@ -73,11 +73,15 @@ class Replays:
             k = int(np.argmax(angles))
             found = f"in {engine} the object is turned {{value}} {at(k)}"
             figures.append(Figure("replay_angle", angles[k], limits.replay_angle, "deg", found))
-        share = self.drops / len(self.perturbed) if self.perturbed else float(self.nominal.dropped)
-        found = f"in {engine} {self.drops} of {len(self.perturbed)} perturbed replays drop the object, {{value}}"
+        if self.nominal.dropped or self.perturbed:
+            figures.append(self._dropped(engine, limits.replay_dropped))
+        return figures
+
+    def _dropped(self, engine: str, limit: float) -> Figure:
         if self.nominal.dropped:
-            found = f"in {engine} the object is dropped with nothing perturbed"
-        return [*figures, Figure("replay_dropped", share, limits.replay_dropped, "share", found)]
+            return Figure("replay_dropped", 1.0, limit, "share", f"in {engine} the object is dropped as planned")
+        found = f"in {engine} {self.drops} of {len(self.perturbed)} perturbed replays drop the object, {{value}}"
+        return Figure("replay_dropped", self.drops / len(self.perturbed), limit, "share", found)
 
     def dropped_before(self, task: Task | None = None) -> str | None:
         """Say before which goal the object is lost with nothing perturbed; None where it is not.

@@ -74,11 +74,13 @@ class Audit:
         name: of the task.
         figures: by name, in the order they are reported.
         problems: what is wrong with the files themselves, a sentence each.
+        notes: what a reader should know though nothing is wrong with it, a sentence each.
     """
 
     name: str
     figures: dict[str, Figure]
     problems: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def certified(self) -> bool:

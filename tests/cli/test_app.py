@@ -23,9 +23,10 @@ from casadi_hands.cli.app import Stage, app
 from casadi_hands.design import Design
 from casadi_hands.export.mjcf import scene_mjcf
 from casadi_hands.task import load_task
-from casadi_hands.verify import Perturbation, Replay
+from casadi_hands.verify import Perturbation, Replay, Replays
+from casadi_hands.verify.replay import GoalError
 from tests.alternatives.example import certified, shifted, without_hand
-from tests.export.example import TASK, example_design
+from tests.export.example import TASK, example_design, example_task
 from tests.verify.fixture import Scene, carried
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
@@ -392,26 +393,36 @@ def test_replay_prints_errors_and_drops(monkeypatch: pytest.MonkeyPatch) -> None
 
     def outcome(millimetres: float, dropped: bool = False) -> Replay:
         errors = (1e-3 * millimetres, 2e-3 * millimetres, 3e-3 * millimetres, 0.5, 0.75, 0.25)
-        return Replay(*errors, dropped, ("thumb",) if dropped else (), Perturbation())
+        goals = (GoalError(1e-3 * millimetres, 0.5),) * 3
+        return Replay(*errors, dropped, ("thumb",) if dropped else (), Perturbation(), goals)
 
-    many = [outcome(1.0), outcome(2.0), outcome(900.0, dropped=True)]
+    many = [outcome(1.0), outcome(2.0), outcome(900.0, dropped=True), *[outcome(1.0)] * 7]
     asked: list[tuple[Any, ...]] = []
 
-    def replay_many(*arguments: Any) -> list[Replay]:
+    def run_replays(*arguments: Any) -> Replays:
         asked.append(arguments)
-        return many
+        return Replays("mujoco", example_task(), 1e-3, 7, nominal, tuple(many[: arguments[1]]))
 
-    monkeypatch.setattr(casadi_hands.verify, "replay", lambda folder: outcome(0.5))
-    monkeypatch.setattr(casadi_hands.verify, "replay_many", replay_many)
-    found = run("replay", "folder", "--perturb", 3, "--seed", 7, "--jobs", 2)
+    nominal = outcome(0.5)
+    monkeypatch.setattr(casadi_hands.verify, "run_replays", run_replays)
+    found = run("replay", "folder", "--perturb", 10, "--seed", 7, "--jobs", 2)
     rows = [" ".join(line.split()) for line in found.output.splitlines()]
-    assert asked == [(Path("folder"), 3, 7, 2)]
+    assert asked == [(Path("folder"), 10, 7, 2, "mujoco")]
     assert "as planned 0.5 1 1.5 0.5 0.75 0.25" in rows
-    assert "2 perturbed, mean 1.5 3 4.5 0.5 0.75 0.25" in rows
-    assert "2 perturbed, worst 2 4 6 0.5 0.75 0.25" in rows
-    assert "perturbed: dropped in 1 of 3" in rows
+    assert "9 perturbed, mean 1.11 2.22 3.33 0.5 0.75 0.25" in rows
+    assert "9 perturbed, worst 2 4 6 0.5 0.75 0.25" in rows
+    assert "from goal 3: 0.5 mm, 0.5 deg" in rows
+    assert "perturbed: dropped in 1 of 10" in rows
     assert found.exit_code == 0
-    monkeypatch.setattr(casadi_hands.verify, "replay", lambda folder: outcome(50.0, dropped=True))
+    # One in three is more than a tenth; an object that is far from a goal is, too, and one that is dropped.
+    found = run("replay", "folder", "--perturb", 3)
+    assert found.exit_code == 1
+    assert "in MuJoCo 1 of 3 perturbed replays drop the object, 33.3 %; limit 10 %" in found.output
+    nominal = outcome(4.0)
+    found = run("replay", "folder")
+    assert found.exit_code == 1
+    assert "in MuJoCo the object is 4 mm from goal 1 at 0 s; limit 3 mm" in found.output
+    nominal = outcome(0.5, dropped=True)
     assert run("replay", "folder").exit_code == 1
 
 
