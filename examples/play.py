@@ -11,9 +11,10 @@ model = mujoco.MjModel.from_xml_path(f"{folder}/scene.xml")
 data = mujoco.MjData(model)
 mujoco.mj_resetDataKeyframe(model, data, 0)  # the keyframe "start"
 motors = [model.actuator(name).id for name in motion["joint_names"]]
+told = ("joint_commands", "base_position", "base_orientation", "external_force", "external_torque")
 for step in range(-500, round(motion["time"][-1] / model.opt.timestep)):  # half a second holds the start
-    now = {name: [np.interp(step * model.opt.timestep, motion["time"], x) for x in motion[name].T] for name in
-           ("joint_commands", "base_position", "base_orientation", "external_force", "external_torque")}
+    t = step * model.opt.timestep
+    now = {name: [np.interp(t, motion["time"], x) for x in motion[name].T] for name in told}
     data.ctrl[motors] = now["joint_commands"]
     data.body("object").xfrc_applied[:] = now["external_force"] + now["external_torque"]
     if model.nmocap:  # a palm that moves
