@@ -13,7 +13,7 @@ from unittest.mock import patch
 
 from casadi_hands import load_task, solve
 from casadi_hands.nlp import Options, Solution, Solver
-from casadi_hands.pipeline import Progress, certify, judge
+from casadi_hands.pipeline import Progress, judge
 from casadi_hands.stages.floating import FloatingStage
 from casadi_hands.stages.refine import RefineStage
 from casadi_hands.stages.synthesis import SynthesisStage
@@ -22,7 +22,6 @@ from casadi_hands.stages.whole_hand import WholeHandStage
 KINDS = ("building", "value", "gradient", "Jacobian", "Hessian", "rest of IPOPT", "replays", "audits")
 CALLED = {"value": ("nlp_f", "nlp_g"), "gradient": ("nlp_grad_f",), "Jacobian": ("nlp_jac_g",)}
 CALLED["Hessian"] = ("nlp_hess_l",)
-_REPLAYS = ("replay", "replay_many")
 Seconds = dict[str, dict[str, float]]
 
 
@@ -50,8 +49,8 @@ class Ledger:
         patches = [patch.object(stage, "__init__", self._timed(stage.__init__)) for stage in stages]
         patches += [patch.object(Solver, "nlpsol", self._timed(Solver.nlpsol))]
         patches += [patch.object(Solver, "solve", self._booked(Solver.solve))]
-        patches += [patch.object(certify, name, self._timed(getattr(certify, name), "replays")) for name in _REPLAYS]
-        patches += [patch.object(judge, "audit", self._timed(judge.audit, "audits", "audit"))]
+        patches += [patch.object(judge, "run_replays", self._timed(judge.run_replays, "replays"))]
+        patches += [patch.object(judge, "audit_files", self._timed(judge.audit_files, "audits", "audit"))]
         for each in patches:
             each.start()
         try:

@@ -1,0 +1,120 @@
+"""Let other programs load and play solved designs, and print tables of what they say.
+
+    python scripts/outside.py results/gallery/* --out docs/outside.md
+
+For every result folder with a scene: how far the object moves in two seconds of MuJoCo at the keyframe ``start`` with
+that keyframe's commands held; where ``examples/play.py`` ends against the replay; whether MuJoCo and Drake drop it,
+unperturbed and in five perturbed replays; what Pinocchio, MuJoCo, yourdfpy and Drake make of ``hand.urdf``; what simcheck
+and mjcf-doctor find.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from outside_models import disagreement
+from scipy.spatial.transform import Rotation
+from shared import options_of, table_text
+
+from casadi_hands import Design
+from casadi_hands.verify import Replays, run_replays
+
+PLAYER = Path(__file__).parents[1] / "examples" / "play.py"
+PERTURBED = 5
+HEAD = ("task", "joints", "held 2 s, mm", "player − replay", "models differ by", "checkers: errors, warnings")
+ENGINES_HEAD = ("task", "MuJoCo: mean", "Drake: mean", "MuJoCo drops", "Drake drops", "agree")
+
+
+def main() -> None:
+    """Write both tables."""
+    parser = options_of(__doc__)
+    parser.add_argument("folders", metavar="DIR", nargs="+", type=Path, help="result folders")
+    parser.add_argument("--out", type=Path, help="Markdown file for the tables")
+    parser.add_argument("--jobs", type=int, default=1, help="processes for the replays")
+    given = parser.parse_args()
+    rows, engines, same = [], [], []
+    for folder in given.folders:
+        if not (folder / "scene.xml").is_file():
+            print(f"{folder}: no scene", file=sys.stderr)
+            continue
+        design = Design.load(folder)
+        assert design.hand is not None
+        joints = "+".join(str(len(finger.links)) for finger in design.hand.fingers)
+        played = {name: run_replays(folder, PERTURBED, 0, given.jobs, name) for name in ("mujoco", "drake")}
+        rows.append(
+            (design.task.name, joints, f"{1e3 * held(folder):.2f}", apart(folder, design), *loaded(folder, design))
+        )
+        first, second = (drops_of(played[name]) for name in played)
+        agree = [a == b for a, b in zip(first, second, strict=True)]
+        same += agree
+        means = [f"{1e3 * p.nominal.position_mean:.2g} mm · {p.nominal.angle_mean:.2g}°" for p in played.values()]
+        engines.append((design.task.name, *means, marks(first), marks(second), f"{sum(agree)}/{len(agree)}"))
+        print(" | ".join((*rows[-1], *engines[-1][1:])), flush=True)
+    share = 100 * np.mean(same)
+    text = (
+        f"{table_text(HEAD, rows)}\n{table_text(ENGINES_HEAD, engines)}\n"
+        f"The engines agree on hold or drop in {sum(same)} of {len(same)} replays, {share:.1f} %.\n"
+    )
+    print(text)
+    if given.out is not None:
+        given.out.write_text(text, encoding="utf-8")
+
+
+def held(folder: Path) -> float:
+    """How far the object moves, m, in two seconds at the keyframe ``start``, by MuJoCo alone."""
+    model = mujoco.MjModel.from_xml_path(str(folder / "scene.xml"))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    start = data.body("object").xpos.copy()
+    for _ in range(round(2.0 / model.opt.timestep)):
+        mujoco.mj_step(model, data)
+    return float(np.linalg.norm(data.body("object").xpos - start))
+
+
+def apart(folder: Path, design: Design) -> str:
+    """How far the player's end is from the replay's, by their errors against the plan."""
+    said = subprocess.run([sys.executable, str(PLAYER), str(folder)], capture_output=True, text=True, check=True).stdout
+    pose = np.array([float(word) for word in said.split()[1:8]])
+    motion, nominal = design.motion, run_replays(folder, 0).nominal
+    assert motion is not None
+    away = float(np.linalg.norm(pose[:3] - motion.object_position[-1]))
+    planned, turned = (Rotation.from_quat(q, scalar_first=True) for q in (motion.object_orientation[-1], pose[3:]))
+    angle = float(np.rad2deg((planned.inv() * turned).magnitude()))
+    return f"{1e3 * (away - nominal.position_final):.1g} mm · {angle - nominal.angle_final:.1g}°"
+
+
+def loaded(folder: Path, design: Design) -> tuple[str, str]:
+    """The largest relative difference of what four libraries make of the hand, and what two checkers find."""
+    return f"{disagreement(folder, design):.1g}", checked(folder)
+
+
+def checked(folder: Path) -> str:
+    """Errors and warnings of simcheck and mjcf-doctor over ``hand.urdf`` and ``scene.xml``."""
+    files = [str(folder / name) for name in ("hand.urdf", "scene.xml")]
+    command = ["simcheck", "check", *files, "--json", "-"]
+    found = json.loads(subprocess.run(command, capture_output=True, text=True, check=False).stdout)
+    levels = [kind for kind in ("error", "warning") for asset in found for _ in range(asset["counts"][kind])]
+    for file in files:
+        said = subprocess.run(["mjcf-doctor", "check", file], capture_output=True, text=True, check=False).stdout
+        levels += ["error"] * said.count("ERROR") + ["warning"] * said.count("WARN")
+    return f"{levels.count('error')}, {levels.count('warning')}"
+
+
+def drops_of(played: Replays) -> list[bool]:
+    """Whether the object is dropped: unperturbed, then in each perturbed replay."""
+    return [played.nominal.dropped, *(each.dropped for each in played.perturbed)]
+
+
+def marks(dropped: list[bool]) -> str:
+    """One letter a replay: h for held, D for dropped."""
+    return "".join("D" if each else "h" for each in dropped)
+
+
+if __name__ == "__main__":
+    main()
