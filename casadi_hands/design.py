@@ -154,6 +154,17 @@ class Design:
         first = self.replays[0]
         return int(first["of"] if first["dropped_as_planned"] else first["dropped"])
 
+    @property
+    def replay_words(self) -> str:
+        """What the replays said, in a line; empty where there were none."""
+        if not self.replays:
+            return ""
+        first = self.replays[0]
+        planned = f"{first['mean']['mm']:.2g} mm and {first['mean']['degrees']:.2g}° off plan on average"
+        if first["dropped_as_planned"]:
+            planned = "drops the object as planned"
+        return f"in MuJoCo {planned}, {first['dropped']} of {first['of']} perturbed replays drop it"
+
     def save(self, directory: str | Path) -> None:
         """Write the result folder; a partial design writes the files for which there is something to write.
 

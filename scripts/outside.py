@@ -4,8 +4,8 @@
 
 For every result folder with a scene: how far the object moves in two seconds of MuJoCo at the keyframe ``start`` with
 that keyframe's commands held; where ``examples/play.py`` ends against the replay; whether MuJoCo and Drake drop it,
-unperturbed and in five perturbed replays; what Pinocchio, MuJoCo, yourdfpy and Drake make of ``hand.urdf``; what simcheck
-and mjcf-doctor find.
+unperturbed and in five perturbed replays; what Pinocchio, MuJoCo, yourdfpy and Drake make of ``hand.urdf``; what
+simcheck and mjcf-doctor find.
 """
 
 from __future__ import annotations

@@ -31,9 +31,8 @@ def disagreement(folder: Path, design: Design) -> float:
         f"finger{i}_link{len(finger.links) - 1}": np.array([0, 0, finger.links[-1].length])
         for i, finger in enumerate(design.hand.fingers)
     }
-    found = [
-        seen(file, angles, list(design.hand.joint_names), links, tips) for seen in (_pin, _mujoco, _yourdfpy, _drake)
-    ]
+    given = file, angles, list(design.hand.joint_names), links, tips
+    found = [seen(*given) for seen in (_pin, _mujoco, _yourdfpy, _drake)]
     worst = 0.0
     for name, expected in found[0].items():
         size = float(np.abs(expected).max())

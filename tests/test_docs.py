@@ -52,9 +52,9 @@ def test_first_command_solves_a_task_that_exists() -> None:
 
 
 def test_links_lead_somewhere() -> None:
-    for text in (README, (ROOT / "docs/result-folder.md").read_text(encoding="utf-8")):
-        for target in re.findall(r"\]\(([^)#]+)\)", text):
-            assert target.startswith("https://") or (ROOT / target).exists(), target
+    for page in (ROOT / "README.md", *(ROOT / "docs").glob("*.md")):
+        for target in re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text(encoding="utf-8")):
+            assert target.startswith("https://") or (page.parent / target).exists(), f"{page.name}: {target}"
 
 
 def test_every_figure_of_the_audit_is_explained(tmp_path: Path) -> None:

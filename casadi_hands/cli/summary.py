@@ -28,6 +28,8 @@ def design_summary(design: Design, folder: Path) -> RenderableType:
     parts: list[RenderableType] = [_headline(design.task.name, design.status)]
     if design.certificate:
         parts.append(certificate_table(design.certificate))
+    if design.replays:
+        parts.append(Text(f"replays: {design.replay_words}"))
     if design.reason:
         parts.append(Text(f"{'why' if design.status == 'failed' else 'note'}: {design.reason}"))
     if design.hand is not None:

@@ -81,12 +81,14 @@ def open_page(directory: Path) -> Path:
 
 
 def _summary(design: Design, scene: Scene) -> str:
-    """One line: how it ended, how many joints, what an arrow's length means."""
+    """One line: how it ended, how many joints, what an arrow's length means, what replays said."""
     parts = [design.status]
     if design.hand is not None:
         parts.append(f"{len(design.hand.fingers)} fingers, {design.hand.degrees_of_freedom} joints")
     if scene.longest_force > 0:
         parts.append(f"longest force arrow {scene.longest_force:.3g} N")
+    if design.replays:
+        parts.append(design.replay_words)
     return " · ".join(parts)
 
 
