@@ -19,6 +19,7 @@ from casadi_hands.task import Task, parse_task
 
 Array = np.ndarray
 SPLINE_WIDTH = 1e-3  # half the width of g's transition in the collision terms
+STAND = 1.05  # radii of its links that a finger's first joint stands above the palm's face
 
 
 def everything_text(s: float = 1.0) -> str:
@@ -270,9 +271,10 @@ class Motion:
 
 @dataclass
 class PinFinger:
-    """A finger in numeric Pinocchio, palm frame."""
+    """A finger in numeric Pinocchio, palm frame, with links of a radius."""
 
     seed: FingerSeed
+    radius: float
 
     @property
     def axes(self) -> Array:
@@ -285,7 +287,7 @@ class PinFinger:
 
     def chain(self, angles: Array) -> tuple[Array, Array]:
         """Joint origins and tip (n + 1, 3), and the rotation of the last link."""
-        rotation, points = np.eye(3), [np.append(self.seed.base, 0.0)]
+        rotation, points = np.eye(3), [np.append(self.seed.base, STAND * self.radius)]
         for axis, length, angle in zip(self.axes, self.seed.lengths, angles, strict=True):
             rotation = rotation @ pin.exp3(angle * axis)
             points.append(points[-1] + length * rotation[:, 2])

@@ -35,7 +35,7 @@ def bending(elbow: Array) -> tuple[WholeHand, Array]:
     )
     position, vector = rng.normal(size=(COUNT, 3)), rng.uniform(-1, 1, (COUNT, 3))
     palms = Rotation.from_quat(MODEL.palm_quaternion, scalar_first=True)
-    numeric, end = PinFinger(finger), np.array([0, 0, finger.lengths[-1]])
+    numeric, end = PinFinger(finger, MODEL.link_radius), np.array([0, 0, finger.lengths[-1]])
     world = palms.apply([numeric.point(q, end) for q in angles]) + MODEL.palm_position
     turns = Rotation.from_rotvec(vector) * Rotation.from_quat(MODEL.reference, scalar_first=True)
     point = np.zeros((COUNT, MODEL.contacts + 1, 3))

@@ -23,7 +23,7 @@ from tests.stages.blocks import (
     shape,
     surface,
 )
-from tests.stages.example import PinFinger, nearest_on_axis, palm_apart
+from tests.stages.example import STAND, PinFinger, nearest_on_axis, palm_apart
 
 Array = np.ndarray
 Block = tuple[dict[str, object], dict[str, object]]
@@ -85,7 +85,7 @@ def test_a_contact_s_numbers_are_those_of_numpy_and_pinocchio(joints: int, seed:
     case = Contact(joints, seed)
     finger, place, normal, force = case.finger, case.place, case.normal, case.force
     found = numbers(exact_fingers.contact(joints, limited=True), *case.contact)
-    chain, link = PinFinger(finger).chain(finger.angles[0])
+    chain, link = PinFinger(finger, case.radius).chain(finger.angles[0])
     on_link = link.T @ (place.in_palm(case.point) - chain[-2])
     # Kinks of capsules are rounded by a thousandth of their length.
     np.testing.assert_allclose(found["on_object"], case.off_object, atol=1e-5)
@@ -100,7 +100,7 @@ def test_a_contact_s_numbers_are_those_of_numpy_and_pinocchio(joints: int, seed:
     # The fourth power of the friction in use: flat inside the cone, steep towards its edge.
     used = np.linalg.norm(across) / (case.friction * pressing + 0.1)
     np.testing.assert_allclose(found["friction_margin"], used**4, rtol=5e-2)
-    jacobian = PinFinger(finger).jacobian(finger.angles[0], on_link)
+    jacobian = PinFinger(finger, case.radius).jacobian(finger.angles[0], on_link)
     in_palm = place.palm.inv().apply(place.turn.apply(force))
     left, singular, _ = np.linalg.svd(jacobian)
     kept = np.ones(3)
@@ -129,7 +129,7 @@ def test_surfaces_touch_where_normals_are_opposed(joints: int, share: float, out
     across = np.cross(end - start, rng.normal(size=3))
     across /= np.linalg.norm(across)
     case.point = start + share * (end - start) + thick * across
-    chain, link = PinFinger(case.finger).chain(case.finger.angles[0])
+    chain, link = PinFinger(case.finger, case.radius).chain(case.finger.angles[0])
     link_normal = link @ [0.6, 0.8, 0]
     on_axis = chain[-2] + share * (chain[-1] - chain[-2])
     turn = Rotation.align_vectors([-outside * case.place.palm.apply(link_normal)], [across])[0]
@@ -174,6 +174,7 @@ def test_torque_is_a_constraint_only_where_it_is_limited() -> None:
 # Rolling.
 
 REACH, TIP, BALL = 2.0, 0.15, 0.7  # of an upright finger of one joint that turns about y; the ball touches its cap
+FOOT = np.array([0, 0, STAND * TIP])  # where the joint is
 UPRIGHT = FingerSeed(
     base=np.zeros(2),
     lengths=np.array([REACH]),
@@ -207,7 +208,7 @@ def rolling_block(before: Knot, after: Knot) -> Block:
 
 def on_cap(phi: float, spin: float, lean: float = 0.0) -> Knot:
     """A ball that touches the finger's cap at an angle from the pole in the plane of x and z, turned about y."""
-    centre = REACH * np.array([np.sin(lean), 0, np.cos(lean)])
+    centre = FOOT + REACH * np.array([np.sin(lean), 0, np.cos(lean)])
     out = np.array([np.sin(phi + lean), 0, np.cos(phi + lean)])
     return centre + (TIP + BALL) * out, Rotation.from_rotvec([0, spin + lean, 0]), centre + TIP * out, lean
 
@@ -287,7 +288,7 @@ def test_clearances_of_a_finger_are_those_of_coal(touched: int | None, grounded:
         primitives = np.hstack([rng.normal(size=(2, 6)), [[0.2], [0.3]]])
         kernel = exact_fingers.apart(joints, 2, touched, grounded)
         found = numbers(kernel, *clearance_block(finger, place, primitives))["clear"]
-        links = PinFinger(finger).links(finger.angles[0])
+        links = PinFinger(finger, RADIUS).links(finger.angles[0])
         expected = [palm_apart(links[0][1], PALM_RADIUS) - RADIUS]
         for start, end in links[1:]:
             expected += [palm_apart(p, PALM_RADIUS) - RADIUS for p in ((start + end) / 2, end)]
@@ -310,7 +311,7 @@ def test_clearances_of_two_fingers_are_those_of_coal() -> None:
         rng = np.random.default_rng(seed)
         one, other = random_finger(2, rng), random_finger(3, rng)
         found = numbers(exact_fingers.fingers_apart(2, 3), *pair_block(one, other))["clear"]
-        links = [PinFinger(f).links(f.angles[0]) for f in (one, other)]
+        links = [PinFinger(f, RADIUS).links(f.angles[0]) for f in (one, other)]
         expected = [between(a, b, 0.2) for a, b in itertools.product(*links)]
         np.testing.assert_allclose(found, expected, atol=6e-3)
         assert np.median(np.abs(found - expected)) < 1e-4

@@ -58,7 +58,7 @@ def test_contact_kinematics_in_numbers(joints: int) -> None:
     seed = made_up_finger(model, joints, 2, 5)
     strings = np.arange(len(seed.angles)) % 2
     points, jacobians = contact_kinematics(seed, strings, model.link_radius)
-    finger = PinFinger(seed)
+    finger = PinFinger(seed, model.link_radius)
     for k, (angles, string) in enumerate(zip(seed.angles, strings, strict=True)):
         u, v = seed.tips[string]
         lean = np.hypot(u, v) / model.link_radius

@@ -30,7 +30,7 @@ def wide() -> MadeUp:
 def shallowest(made_up: MadeUp, angles: tuple[Array, Array]) -> float:
     """Least distance of the two fingers' surfaces between knots: in the middle, or at least every tenth of a second."""
     radius, least = made_up.model.link_radius, np.inf
-    fingers = [PinFinger(finger) for finger in made_up.start.fingers]
+    fingers = [PinFinger(finger, radius) for finger in made_up.start.fingers]
     for k, step in enumerate(np.diff(made_up.model.schedule.samples)):
         parts = next(n for n in range(2, 9) if step / n <= 0.1 + 1e-9)
         for share in np.arange(1, parts) / parts:

@@ -47,7 +47,7 @@ class Witness:
 
     def __init__(self, model: Model, target: Target, fingers: tuple[FingerSeed, ...]) -> None:
         self.model, self.target, self.fingers, self.deepest = model, target, fingers, 0.0
-        self.pins = [PinFinger(seed) for seed in fingers]
+        self.pins = [PinFinger(seed, model.link_radius) for seed in fingers]
         self.collision_times = np.unique(
             np.concatenate([np.linspace(a, b, 4) for a, b in zip(target.times[:-1], target.times[1:], strict=True)])
         )

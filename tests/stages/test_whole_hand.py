@@ -55,7 +55,7 @@ class Witness(ObjectWitness):
     def __init__(self, model: Model, values: dict[str, Array], fingers: tuple[FingerSeed, ...]) -> None:
         super().__init__(model, values)
         self.fingers, self.values, self.deepest = fingers, values, 0.0
-        self.pins = [PinFinger(seed) for seed in fingers]
+        self.pins = [PinFinger(seed, model.link_radius) for seed in fingers]
         self.palms = [self.palm_at(0), self.palm_at(-1)]
         self.objects = [self.motion.at(0), self.motion.at(-1)]
 

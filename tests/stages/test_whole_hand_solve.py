@@ -73,7 +73,7 @@ def test_contacts_touch_both_surfaces(solved: Solved) -> None:
         for s in np.flatnonzero(result.active[:, contact]):
             point = result.point[s, contact]
             assert np.linalg.norm(project(point, model.capsules[contact])[0] - point) * length < MILLIMETRE
-            chain, rotation = PinFinger(finger).chain(result.angles[i][s])
+            chain, rotation = PinFinger(finger, model.link_radius).chain(result.angles[i][s])
             on_link = rotation.T @ (solved.in_palm(s, point) - chain[-2])
             assert np.linalg.norm(project(on_link, tip)[0] - on_link) * length < MILLIMETRE
 
