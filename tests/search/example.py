@@ -9,7 +9,7 @@ from casadi_hands.stages.model import build_model
 from casadi_hands.stages.synthesis import FingerSeed, Synthesised
 from casadi_hands.stages.target import Target, target_of
 from casadi_hands.task import Task, parse_task
-from tests.stages.example import made_up_solution
+from tests.stages.example import STAND, made_up_solution
 
 BALL = """
 object: {mass: 0.1, shapes: [{sphere: {center: [0, 0, 0], radius: 0.03}}]}
@@ -48,6 +48,11 @@ def ball_target(squeeze: float = SQUEEZE) -> Target:
     return target_of(model, floating)
 
 
+def foot(target: Target) -> float:
+    """Height of a finger's first joint, half extents."""
+    return STAND * target.link_radius
+
+
 def pointing(target: Target, contact: int, axes: list[list[float]]) -> FingerSeed:
     """A straight upright finger whose pole is at its contact at every keyframe, as the contact is at the first.
 
@@ -55,7 +60,7 @@ def pointing(target: Target, contact: int, axes: list[list[float]]) -> FingerSee
     """
     joints = len(axes)
     x, y, z = target.points[0, contact]
-    lengths = np.full(joints, (z - target.link_radius) / joints)
+    lengths = np.full(joints, (z - foot(target) - target.link_radius) / joints)
     frames = []
     for axis in axes:
         unit = np.array(axis) / np.linalg.norm(axis)

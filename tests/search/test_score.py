@@ -7,7 +7,7 @@ import pytest
 
 from casadi_hands.search.score import finger_scores, passive_projector, worst_miss
 from casadi_hands.stages.target import Target
-from tests.search.example import ball_target, hand, pointing
+from tests.search.example import ball_target, foot, hand, pointing
 
 # An upright finger of height h: a turn about x moves its tip along y, one about y along x.
 PUSH_ONLY = [[1, 0, 0]]
@@ -54,7 +54,7 @@ def test_a_finger_that_can_supply_all_scores_nothing_one_that_cannot_its_share_o
         first, second = 0.6 * side, -1.2 * side
         seed.angles[:] = [first, second]
         # Out and back: the tip comes to stand over the base again, at the height of the contact.
-        height = still.points[0, 0, 2] - still.link_radius * np.cos(0.6)
+        height = still.points[0, 0, 2] - foot(still) - still.link_radius * np.cos(0.6)
         seed.lengths[:] = height / (2 * np.cos(0.6))
         seed.base[1] -= still.link_radius * np.sin(0.6) * side
         seed.tips[:] = 0

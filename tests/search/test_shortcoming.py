@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 from casadi_hands.motion import Schedule
 from casadi_hands.search.shortcoming import beyond_reach, moment, shortcoming
 from casadi_hands.stages.target import Target
-from tests.search.example import ball_target, hand, pointing
+from tests.search.example import ball_target, foot, hand, pointing
 
 # The ball's contacts are 9 cm above a palm of 6 cm radius, 3 cm to either side; lengths in units of 3 cm.
 
@@ -23,13 +23,16 @@ def with_links(longest: float) -> Target:
 
 def test_above_the_palm_reach_is_the_links_and_the_tip_s_radius() -> None:
     target = with_links(0.75)
-    np.testing.assert_allclose(beyond_reach(target, 0, 2), 3 - (2 * 0.75 + target.link_radius), atol=1e-9)
+    np.testing.assert_allclose(
+        beyond_reach(target, 0, 2), 3 - foot(target) - (2 * 0.75 + target.link_radius), atol=1e-9
+    )
     assert (beyond_reach(target, 0, 4) < 0).all()
 
 
 def test_beside_the_palm_the_base_is_on_its_rim() -> None:
     target = with_links(0.75)
-    target.points[-1, 1] = [2.4, -3.2, 1.5]  # 4 from the axis, 2 outside a disc of radius 2
+    # 4 from the axis, 2 outside a disc of radius 2; 1.5 above where fingers stand.
+    target.points[-1, 1] = [2.4, -3.2, 1.5 + foot(target)]
     assert beyond_reach(target, 1, 2)[-1] == pytest.approx(2.5 - 1.5 - target.link_radius)
     # The nearest place of a base, by search.
     rim = {"type": "ineq", "fun": lambda xy: target.palm_radius**2 - xy @ xy}
@@ -49,7 +52,7 @@ def test_a_contact_out_of_reach_is_named_with_its_goal_and_the_links() -> None:
     target.points[-1, 0, 2] = 4.0
     made = hand([pointing(target, 0, [[1, 0, 0]] * 2), pointing(target, 1, [[1, 0, 0]])], (0, 1))
     reason = shortcoming(target, made, 0, 60.0)
-    beyond = 30 * (4 - 1.5 - target.link_radius)
+    beyond = 30 * (4 - foot(target) - 1.5 - target.link_radius)
     assert reason.what == (
         f"finger 'left' cannot reach goal 2 (0.6 s) with 2 joints: its contact is {beyond:.1f} mm beyond links of "
         "at most 22.5 mm each"
