@@ -10,7 +10,7 @@ import pytest
 from casadi_hands.alternatives.ranking import largest_torque, margin, rank
 from casadi_hands.design import Design
 from casadi_hands.task import parse_task
-from casadi_hands.verify import audit
+from casadi_hands.verify import audit_files
 from tests.alternatives.example import certified, changed, figure, shifted
 from tests.export.example import TASK, example_design, example_hand, example_task
 from tests.verify.fixture import carried
@@ -87,7 +87,7 @@ def test_margin_is_the_smallest_share_left() -> None:
 
 
 def test_margin_of_an_audit(tmp_path) -> None:
-    found = audit(carried(tmp_path / "task").write(tmp_path / "result"))
+    found = audit_files(carried(tmp_path / "task").write(tmp_path / "result"))
     assert found.certified
     design = replace(example_design(), certificate=found.as_certificate())
     share = {name: 1 - f.value / f.limit for name, f in found.figures.items() if f.limit}

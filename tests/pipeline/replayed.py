@@ -13,6 +13,12 @@ def replayed(design: Design, drops: int) -> Design:
     """A design whose files hold or not, and whose perturbed replays drop the object so often."""
     few = drops <= OF / 10
     status = "feasible" if design.status == "certified" and not few else design.status
-    entry = {"engine": "mujoco", "dropped_as_planned": False, "dropped": drops, "of": OF}
+    entry = {
+        "engine": "mujoco",
+        "mean": {"mm": 0.5, "degrees": 0.8},
+        "dropped_as_planned": False,
+        "dropped": drops,
+        "of": OF,
+    }
     certificate = {**design.certificate, "replay_dropped": {"value": drops / OF, "limit": 0.1, "holds": few}}
     return replace(design, status=status, replays=[entry], certificate=certificate)

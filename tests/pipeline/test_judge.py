@@ -29,19 +29,19 @@ def test_a_motion_is_one_within_the_task_s_limits_or_nearly(
 ) -> None:
     goal = Figure("goal_position", missed, limit, "m", "the object is {value} away from goal 2")
     verdict = Audit("ball", {"goal_position": goal, "slip": SLIPS}, ())
-    monkeypatch.setattr(judge, "audit", lambda _: verdict)
+    monkeypatch.setattr(judge, "audit_files", lambda _: verdict)
     judged = Judge(*still(0.5)).judge(upright(0.0)[1], ())
     assert judged.status == status
     assert "contact 'left' slips 3 mm" in judged.reason
     certain = Audit("ball", {"goal_position": Figure("goal_position", 0.0, limit, "m", "")}, ())
-    monkeypatch.setattr(judge, "audit", lambda _: certain)
+    monkeypatch.setattr(judge, "audit_files", lambda _: certain)
     assert Judge(*still(0.5)).judge(upright(0.0)[1], ()).status == "certified"
 
 
 def test_a_hand_and_its_motion_are_audited_once(monkeypatch: pytest.MonkeyPatch) -> None:
     verdict = Audit("ball", {"slip": SLIPS}, ())
     audits: list[object] = []
-    monkeypatch.setattr(judge, "audit", lambda folder: audits.append(folder) or verdict)
+    monkeypatch.setattr(judge, "audit_files", lambda folder: audits.append(folder) or verdict)
     judges, design = Judge(*still(0.5)), upright(0.0)[1]
     judged = judges.judge(design, ())
     assert judges.audited(judged) is verdict
