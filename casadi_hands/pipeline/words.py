@@ -139,12 +139,12 @@ def motor_remedy(directory: str, design: Design) -> str | None:
             for goal in seen.goals
         )
         if near and not seen.dropped:
-            motors = f"motors of {change.effort * hand.effort:.3g} N·m (actuator.torque)"
-            if change.stiffness > 1:
-                motors += (
-                    f" that are {change.stiffness:g} times as stiff, up to {change.stiffness * stiffest:.3g} N·m/rad,"
-                )
-            return f"With {motors} the same hand reaches every goal there"
+            motors = f"{change.effort * hand.effort:.3g} N·m (actuator.torque)"
+            if change.stiffness == 1:
+                how = f"pressing {change.squeeze:g} times as hard, with motors of {motors}"
+            else:
+                how = f"with motors of {motors} and up to {change.stiffness * stiffest:.3g} N·m/rad"
+            return f"In the same replay {how}, this hand reaches every goal"
     return None
 
 

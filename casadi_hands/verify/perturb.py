@@ -26,6 +26,7 @@ class Perturbation:
         start_turn: (3,) rad, rotation vector by which it starts turned, world.
         stiffness: factor of the motors' stiffness; they stay as damped, relative to critical, and press as planned.
         effort: factor of the motors' torque limits.
+        squeeze: factor of what the commands are ahead of the planned angles, and so of the grip.
     """
 
     mass: float = 1.0
@@ -38,6 +39,7 @@ class Perturbation:
     start_turn: tuple[float, float, float] = (0.0, 0.0, 0.0)
     stiffness: float = 1.0
     effort: float = 1.0
+    squeeze: float = 1.0
 
     @property
     def displaced(self) -> bool:

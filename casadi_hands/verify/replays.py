@@ -156,7 +156,7 @@ def run_replays(
 
 
 def stronger_motors(directory: str | Path) -> Iterator[tuple[Perturbation, Replay]]:
-    """Replay as planned with motors of 2, 4, 8 and 16 times the torque, then the stiffness, of the hand's.
+    """Replay as planned with motors that press harder, and have the torque for that, then with stiffer ones.
 
     Args:
         directory: the result folder.
@@ -165,6 +165,9 @@ def stronger_motors(directory: str | Path) -> Iterator[tuple[Perturbation, Repla
         what was changed, and how it went.
     """
     player = Player(directory)
-    for factor in (2.0, 4.0, 8.0, 16.0):
-        for change in (Perturbation(effort=factor), Perturbation(effort=factor, stiffness=factor)):
-            yield change, player.play(change)
+    for factor in (1.5, 2.0, 3.0, 4.0, 6.0, 8.0):
+        change = Perturbation(effort=factor, squeeze=factor)
+        yield change, player.play(change)
+    for factor in (2.0, 4.0, 8.0):
+        change = Perturbation(effort=factor, stiffness=factor)
+        yield change, player.play(change)

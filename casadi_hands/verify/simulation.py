@@ -144,7 +144,7 @@ class Simulation:
             raise DesignError(f"{file}: {error}") from None
         self._find(folder, file)
         self._bias = np.asarray(perturbation.joint_bias or np.zeros(len(folder.motion.joint_names)))
-        self._displaced, self._stiffer = perturbation.displaced, perturbation.stiffness
+        self._displaced, self._ahead = perturbation.displaced, perturbation.squeeze / perturbation.stiffness
         driven = self._actuators
         self.model.actuator_gainprm[driven, 0] *= perturbation.stiffness
         self.model.actuator_biasprm[driven, 1] *= perturbation.stiffness
@@ -250,7 +250,7 @@ class Simulation:
 
     def _follow(self, plan: Plan, i: int, squeeze: float) -> None:
         """Set the motors' set points for a step, with a share of what they are ahead of the planned angles."""
-        ahead = squeeze / self._stiffer * (plan.commands[i] - plan.angles[i])
+        ahead = squeeze * self._ahead * (plan.commands[i] - plan.angles[i])
         self.data.ctrl[self._actuators] = plan.angles[i] + self._bias + ahead
         if self._mocap >= 0:
             self.data.mocap_pos[self._mocap] = plan.palm_position[i]
