@@ -1,5 +1,6 @@
 """A design on disk and back."""
 
+import hashlib
 import json
 from dataclasses import fields, replace
 
@@ -8,11 +9,14 @@ import pytest
 
 from casadi_hands.design import Design
 from casadi_hands.errors import DesignError
+from casadi_hands.export.commands import commanded
 from casadi_hands.export.folder import save_design
 from casadi_hands.task import parse_task
 from tests.export.example import TASK, example_design
 
-FILES = {"task.yaml", "hand.urdf", "object.urdf", "scene.xml", "motion.npz", "result.json", "viewer.html"}
+FOR_PEOPLE = {"motion.csv", "viewer.html"}
+KEPT = {"joint_angles", "joint_names"}
+FILES = FOR_PEOPLE | {"task.yaml", "hand.urdf", "object.urdf", "scene.xml", "motion.npz", "result.json"}
 
 DRAWING = """
 name: draw
@@ -46,9 +50,9 @@ def test_a_folder_holds_every_file(saved):
     assert {path.name for path in saved.iterdir()} == FILES
 
 
-def test_a_page_is_left_out_where_nobody_looks_at_it(saved):
+def test_what_is_for_people_is_left_out_where_nobody_looks_at_it(saved):
     save_design(example_design(), saved, page=False)
-    assert {path.name for path in saved.iterdir()} == FILES - {"viewer.html"}
+    assert {path.name for path in saved.iterdir()} == FILES - FOR_PEOPLE
 
 
 def test_a_design_comes_back_as_it_was(saved):
@@ -56,8 +60,44 @@ def test_a_design_comes_back_as_it_was(saved):
     for item in fields(Design):
         if item.name != "motion":
             assert getattr(loaded, item.name) == getattr(design, item.name), item.name
-    for item in fields(design.motion):
-        assert np.array_equal(getattr(loaded.motion, item.name), getattr(design.motion, item.name))
+    # The joints' velocities, torques and commands are added; nothing is made up of what no task asked for.
+    motion = commanded(design.task, design.hand, design.motion)
+    for item in fields(motion):
+        assert np.array_equal(getattr(loaded.motion, item.name), getattr(motion, item.name)), item.name
+    assert loaded.motion.contact_force_disturbed is None
+
+
+def test_disturbed_forces_come_back_as_they_were(tmp_path):
+    design, rng = example_design(), np.random.default_rng(0)
+    disturbed = {
+        "contact_force_disturbed": rng.normal(size=(21, 3, 3)),
+        "external_force_disturbed": rng.normal(size=(21, 3)),
+        "external_torque_disturbed": rng.normal(size=(21, 3)),
+    }
+    replace(design, motion=replace(design.motion, **disturbed)).save(tmp_path)
+    loaded = Design.load(tmp_path)
+    for name, value in disturbed.items():
+        assert np.array_equal(getattr(loaded.motion, name), value), name
+
+
+def test_replays_come_back_as_they_were_and_earlier_folders_have_none(saved):
+    entry = {"engine": "mujoco", "mean": {"mm": 0.5, "degrees": 1.0}, "dropped_as_planned": False, "dropped": 1}
+    replays = [{**entry, "of": 12}]
+    replace(example_design(), replays=replays).save(saved)
+    assert record(saved)["replays"] == replays
+    assert Design.load(saved).replays == replays
+    earlier = {name: value for name, value in record(saved).items() if name not in ("replays", "task_hash")}
+    (saved / "result.json").write_text(json.dumps(earlier))
+    assert Design.load(saved).replays == []
+
+
+def test_a_motion_of_an_earlier_version_has_no_commands(saved):
+    with np.load(saved / "motion.npz") as file:
+        earlier = {name: file[name] for name in file.files if not name.startswith("joint_") or name in KEPT}
+    np.savez(saved / "motion.npz", **earlier)
+    motion = Design.load(saved).motion
+    assert (motion.joint_velocities, motion.joint_torques, motion.joint_commands) == (None, None, None)
+    assert np.array_equal(motion.joint_angles, example_design().motion.joint_angles)
 
 
 def test_saving_again_gives_the_same_bytes(saved, tmp_path):
@@ -69,6 +109,8 @@ def test_saving_again_gives_the_same_bytes(saved, tmp_path):
 def test_the_record_says_what_the_format_says(saved):
     result = record(saved)
     assert result["format"] == 1
+    assert result["task_hash"] == hashlib.sha256((saved / "task.yaml").read_bytes()).hexdigest()
+    assert result["replays"] == []
     assert (result["status"], result["task"], result["degrees_of_freedom"]) == ("feasible", "move a capsule & back", 6)
     assert result["object"]["shapes"] == [
         {"type": "capsule", "start": [0, 0, -0.04], "end": [0, 0, 0.04], "radius": 0.02}
@@ -77,7 +119,7 @@ def test_the_record_says_what_the_format_says(saved):
     assert (result["ground_height"], result["ground_friction"]) == (0.2, 0.8)
     assert result["hand"]["palm"] == {"radius": 0.06, "thickness": 0.012}
     index = result["hand"]["fingers"][1]
-    assert (index["name"], index["base"]) == ("index", [0.02, 0.045, 0])
+    assert (index["name"], index["base"]) == ("index", [0.02, 0.045, 1.05 * 0.008])
     assert index["links"][1] == {"length": 0.08, "radius": 0.008, "axis": [1, 0, 0]}
     assert {"casadi-hands", "casadi", "pin", "numpy"} <= set(result["versions"])
     assert result["certificate"]["slip"]["holds"] is False
@@ -107,7 +149,11 @@ def test_a_failed_design_keeps_what_exists(tmp_path):
     Design(task=whole.task, status="failed", reason="stopped", motion=free).save(tmp_path / "floating")
     assert {path.name for path in (tmp_path / "floating").iterdir()} == FILES - {"hand.urdf", "scene.xml"}
     Design(task=whole.task, status="failed", reason="stopped", hand=whole.hand).save(tmp_path / "synthesis")
-    assert {path.name for path in (tmp_path / "synthesis").iterdir()} == FILES - {"motion.npz", "scene.xml"}
+    assert {path.name for path in (tmp_path / "synthesis").iterdir()} == FILES - {
+        "motion.npz",
+        "motion.csv",
+        "scene.xml",
+    }
     assert Design.load(tmp_path / "floating").hand is None
     assert Design.load(tmp_path / "synthesis").motion is None
     assert Design.load(tmp_path / "synthesis").hand == whole.hand

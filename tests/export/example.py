@@ -26,7 +26,8 @@ ground: {height: 0.2, friction: 0.8}
 """
 LINK_RADIUS = 0.008
 LENGTHS = (0.07, 0.08)
-BASES = {"thumb": (-0.01, -0.045, 0.0), "index": (0.02, 0.045, 0.0), "middle": (-0.03, 0.045, 0.0)}
+HEIGHT = 1.05 * LINK_RADIUS  # of the first joints, so that their balls clear the palm's face
+BASES = {"thumb": (-0.01, -0.045, HEIGHT), "index": (0.02, 0.045, HEIGHT), "middle": (-0.03, 0.045, HEIGHT)}
 
 
 def example_task() -> Task:
@@ -64,7 +65,7 @@ def example_motion(palm_shift: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> 
         for name, finger_base in BASES.items():
             side = np.sign(finger_base[1])
             tip = palm.T @ (position[k] - [0.0, 0.0, 0.3]) + [finger_base[0], side * (0.02 + LINK_RADIUS), 0.0]
-            row.append(_bend(tip[1] - finger_base[1], tip[2], side))
+            row.append(_bend(tip[1] - finger_base[1], tip[2] - finger_base[2], side))
             normal = palm @ [0.0, -side, 0.0]
             force.append(normal * (1.2 if name == "thumb" else 0.6) + [0.0, 0.0, 0.327])
             on_object.append(turn.T @ (palm @ [finger_base[0], side * 0.02, 0.0]))
