@@ -39,6 +39,7 @@ class Limits(Section):
         "point contacts can never resist a spin about the line through them.",
     )
     replay_position: NonNegative = Field(
+        default=0.002,
         description="Distance of object (or tool) and any goal when the design is replayed as planned, m.",
         json_schema_extra={"default": "the larger of 2 mm and 5 % of the object's half extent"},
     )
