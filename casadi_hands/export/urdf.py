@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from casadi_hands.design import Finger, Hand
     from casadi_hands.task import Task
 
+_UPRIGHT = 1e-12  # of a unit vector, what no direction can be read off
+
 
 def hand_urdf(hand: Hand, world: tuple[Sequence[float], Sequence[float]] | None = None) -> str:
     """The hand as URDF text.
@@ -44,8 +46,8 @@ def hand_urdf(hand: Hand, world: tuple[Sequence[float], Sequence[float]] | None 
         fixed = SubElement(robot, "joint", name="world_to_palm", type="fixed")
         SubElement(fixed, "parent", link="world")
         SubElement(fixed, "child", link="palm")
-        turn = Rotation.from_quat(orientation, scalar_first=True).as_euler("xyz")
-        SubElement(fixed, "origin", xyz=numbers(position), rpy=numbers(turn.tolist()))
+        turn = Rotation.from_quat(orientation, scalar_first=True).as_matrix()
+        SubElement(fixed, "origin", xyz=numbers(position), rpy=numbers(_roll_pitch_yaw(turn)))
     palm = SubElement(robot, "link", name="palm")
     _add_inertial(palm, palm_inertial(hand))
     middle = np.array([0.0, 0.0, -hand.palm_thickness / 2])
@@ -71,6 +73,14 @@ def object_urdf(task: Task) -> str:
     for shape in body.shapes:
         _add_capsule(link, *shape.segment, shape.radius, OBJECT_COLOR, OBJECT_COLOR)
     return document(robot)
+
+
+def _roll_pitch_yaw(turn: np.ndarray) -> tuple[float, float, float]:
+    """URDF's angles, rad, of a rotation (3, 3); where x points straight up or down the yaw, then free, is 0."""
+    level = float(np.hypot(turn[0, 0], turn[1, 0]))
+    yaw = float(np.arctan2(turn[1, 0], turn[0, 0])) if level > _UPRIGHT else 0.0
+    across = np.array([-np.sin(yaw), np.cos(yaw), 0.0]) @ turn  # (0, cos roll, -sin roll)
+    return float(np.arctan2(-across[2], across[1])), float(np.arctan2(-turn[2, 0], level)), yaw
 
 
 def _robot(name: str) -> Element:

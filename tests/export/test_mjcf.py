@@ -7,10 +7,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from casadi_hands.export.commands import commanded
 from casadi_hands.export.mjcf import scene_mjcf
 from casadi_hands.export.urdf import hand_urdf
 from casadi_hands.task import parse_task
 from tests.export.example import TASK, example_hand, example_motion, example_task
+from tests.export.test_urdf import odd_hand
 
 
 def scene(task=None, motion=None):
@@ -54,19 +56,94 @@ def test_masses_and_inertias_agree_with_urdf_and_task():
     assert sorted(model.body("object").inertia) == pytest.approx(sorted(principal), rel=1e-9)
 
 
-def test_the_start_is_the_motions_first_sample():
+@pytest.mark.parametrize("reset", [True, False])
+def test_the_start_is_the_motions_first_sample(reset):
+    # Whether the keyframe is asked for or the scene just loaded.
     model, motion = scene(), example_motion()
-    data = start(model)
+    data = start(model) if reset else mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     assert data.body("object").xpos == pytest.approx(motion.object_position[0])
     assert data.body("palm").xpos == pytest.approx(motion.base_position[0])
     assert data.body("palm").xmat.reshape(3, 3)[:, 2] == pytest.approx([1, 0, 0], abs=1e-12)
     for k, name in enumerate(motion.joint_names):
         assert data.joint(name).qpos[0] == motion.joint_angles[0, k]
-        assert data.ctrl[model.actuator(name).id] == motion.joint_angles[0, k]
     for c, link in enumerate(motion.contact_link):
         world = data.body(link).xpos + data.body(link).xmat.reshape(3, 3) @ motion.contact_point_link[0, c]
         assert world == pytest.approx(motion.object_position[0] + motion.contact_point_object[0, c], abs=1e-9)
+
+
+def test_bodies_stand_at_the_start_as_in_the_urdf():
+    hand, motion = odd_hand(), example_motion()
+    angles = np.random.default_rng(2).uniform(-1, 1, (len(motion.time), 6))
+    motion = replace(motion, joint_angles=angles, joint_names=hand.joint_names, contact_link=("finger0_link0",) * 3)
+    model = mujoco.MjModel.from_xml_string(scene_mjcf(example_task(), hand, motion))
+    data = mujoco.MjData(model)
+    urdf = pin.buildModelFromXML(hand_urdf(hand))
+    other = urdf.createData()
+    palm = pin.SE3(pin.Quaternion(*motion.base_orientation[0]), motion.base_position[0])
+    # As loaded, and wherever the joints turn then: the axes are the URDF's too.
+    for row in (None, angles[0], angles[1]):
+        if row is not None:
+            for name, angle in zip(hand.joint_names, row, strict=True):
+                data.joint(name).qpos = angle
+        mujoco.mj_kinematics(model, data)
+        configuration = pin.neutral(urdf)
+        for name, angle in zip(hand.joint_names, angles[0] if row is None else row, strict=True):
+            configuration[urdf.joints[urdf.getJointId(name)].idx_q] = angle
+        pin.framesForwardKinematics(urdf, other, configuration)
+        for i, finger in enumerate(hand.fingers):
+            for j in range(len(finger.links)):
+                pose = palm * other.oMf[urdf.getFrameId(f"finger{i}_link{j}")]
+                body = data.body(f"finger{i}_link{j}")
+                assert body.xpos == pytest.approx(pose.translation, abs=1e-12)
+                assert body.xmat.reshape(3, 3) == pytest.approx(pose.rotation, abs=1e-12)
+
+
+def test_loaded_and_not_reset_no_finger_is_in_the_object():
+    model = scene()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    item, apart = model.geom("object0").id, np.zeros(6)
+    for i in range(3):
+        first, last = (
+            mujoco.mj_geomDistance(model, data, model.geom(f"finger{i}_link{j}").id, item, 1.0, apart) for j in range(2)
+        )
+        assert first > 0.01
+        assert last == pytest.approx(0, abs=1e-4)
+    assert all(contact.dist > -1e-4 for contact in data.contact)
+
+
+@pytest.mark.parametrize("palm_shift", [(0.0, 0.0, 0.0), (0.0, 0.02, 0.05)])
+def test_keyframes_are_the_start_and_the_goals(palm_shift):
+    task, hand = example_task(), example_hand()
+    motion = commanded(task, hand, example_motion(palm_shift))
+    model = scene(motion=example_motion(palm_shift))  # given its commands on the way
+    assert [model.key(k).name for k in range(model.nkey)] == ["start", "goal1", "goal2", "goal3"]
+    data = mujoco.MjData(model)
+    for name, sample in (("start", 0), ("goal1", 0), ("goal2", 10), ("goal3", 20)):
+        mujoco.mj_resetDataKeyframe(model, data, model.key(name).id)
+        assert data.time == motion.time[sample]
+        mujoco.mj_kinematics(model, data)
+        for body, place in (("object", "object"), ("palm", "base")):
+            assert data.body(body).xpos == pytest.approx(getattr(motion, f"{place}_position")[sample], abs=1e-12)
+            turn = getattr(motion, f"{place}_orientation")[sample]
+            assert abs(data.body(body).xquat @ turn) == pytest.approx(1, abs=1e-12)
+        for k, joint in enumerate(motion.joint_names):
+            assert data.joint(joint).qpos[0] == motion.joint_angles[sample, k]
+            assert data.ctrl[model.actuator(joint).id] == motion.joint_commands[sample, k]
+        if any(palm_shift):
+            assert data.mocap_pos[0] == pytest.approx(motion.base_position[sample], abs=1e-12)
+            assert data.mocap_quat[0] == pytest.approx(motion.base_orientation[sample], abs=1e-12)
+
+
+@pytest.mark.parametrize("name", ["start", "goal1", "goal2", "goal3"])
+def test_commands_of_a_keyframe_hold_the_object_there(name):
+    model = scene()
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key(name).id)
+    before = data.joint("object").qpos[:3].copy()
+    mujoco.mj_step(model, data, 1000)
+    assert np.linalg.norm(data.body("object").xpos - before) < 0.001
 
 
 def test_neighbours_in_a_chain_do_not_collide():

@@ -1,16 +1,21 @@
 """The URDF as three independent readers see it."""
 
+import warnings
+from dataclasses import replace
+from xml.etree import ElementTree
+
 import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
 import yourdfpy
+from scipy.spatial.transform import Rotation
 
 from casadi_hands.design import Finger, Hand, Link
 from casadi_hands.errors import DesignError
 from casadi_hands.export.urdf import hand_urdf, object_urdf
 from casadi_hands.task import parse_task
-from tests.export.example import example_hand, example_task
+from tests.export.example import LINK_RADIUS, example_hand, example_motion, example_task
 
 TURNED = """
 name: turned
@@ -127,6 +132,115 @@ def test_a_segment_is_a_capsule_from_its_joint_to_the_next(tmp_path):
         assert spheres == [0.0, 0.07]
         assert cylinder.origin[2, 3] == 0.035
         assert (cylinder.geometry.cylinder.length, cylinder.geometry.cylinder.radius) == (0.07, 0.008)
+
+
+def touches(hand, pairs, angles):
+    """Which of the pairs of links MuJoCo sees touch or overlap in the URDF, at joint angles by name."""
+    model = mujoco.MjModel.from_xml_string(hand_urdf(hand))
+    data = mujoco.MjData(model)
+    for name, angle in angles.items():
+        data.joint(name).qpos = angle
+    mujoco.mj_kinematics(model, data)
+    found = set()
+    for one, other in pairs:
+        geoms = [np.flatnonzero(model.geom_bodyid == model.body(name).id) for name in (one, other)]
+        least = min(mujoco.mj_geomDistance(model, data, a, b, 1.0, None) for a in geoms[0] for b in geoms[1])
+        found |= {(one, other)} if least <= 0 else set()
+    return found
+
+
+AT_PALM = [("palm", f"finger{i}_link0") for i in range(3)]
+
+
+@pytest.mark.parametrize("toward", np.linspace(0, 2 * np.pi, 7))
+def test_first_links_clear_the_palm_however_they_turn_above_it(toward):
+    # About axes in the palm's plane links lie level at a right angle; about its normal they stand.
+    for axis in (
+        (np.cos(toward), np.sin(toward), 0.0),
+        (0.0, 0.0, 1.0),
+        (0.6 * np.cos(toward), 0.6 * np.sin(toward), 0.8),
+    ):
+        hand = turning_about(axis)
+        for angle in np.linspace(-np.pi / 2, np.pi / 2, 9):
+            joints = {f"finger{i}_joint0": angle for i in range(3)}
+            assert not touches(hand, AT_PALM, joints), (axis, angle)
+    # Below level they are in it, however little.
+    joints = {f"finger{i}_joint0": np.pi / 2 + 0.1 for i in range(3)}
+    assert touches(turning_about((np.cos(toward), np.sin(toward), 0.0)), AT_PALM, joints)
+
+
+def turning_about(axis):
+    """The example's hand, its first joints turned by another axis; they stand where solved hands' do."""
+    hand = example_hand()
+    fingers = (replace(f, links=(replace(f.links[0], axis=tuple(map(float, axis))), f.links[1])) for f in hand.fingers)
+    return replace(hand, fingers=tuple(fingers))
+
+
+def test_no_link_overlaps_the_palm_on_the_motion():
+    hand, motion = example_hand(), example_motion()
+    pairs = AT_PALM + [("palm", f"finger{i}_link1") for i in range(3)]
+    for row in motion.joint_angles:
+        assert not touches(hand, pairs, dict(zip(motion.joint_names, row, strict=True)))
+
+
+def test_a_joint_at_the_palm_s_face_would_be_in_it():
+    # What the height above the face is for.
+    hand = example_hand()
+    flat = replace(hand, fingers=tuple(replace(f, base=(*f.base[:2], 0.0)) for f in hand.fingers))
+    assert touches(flat, AT_PALM, {}) == set(AT_PALM)
+    assert min(finger.base[2] for finger in hand.fingers) > LINK_RADIUS
+
+
+def test_every_joint_has_one_transmission():
+    hand = odd_hand()
+    root = ElementTree.fromstring(hand_urdf(hand))
+    transmissions = root.findall("transmission")
+    assert [item.find("joint").get("name") for item in transmissions] == list(hand.joint_names)
+    assert len({item.get("name") for item in transmissions}) == len(transmissions)
+    assert len({item.find("actuator").get("name") for item in transmissions}) == len(transmissions)
+    for item in transmissions:
+        assert item.find("type").text == "transmission_interface/SimpleTransmission"
+        assert item.find("joint/hardwareInterface").text == "hardware_interface/PositionJointInterface"
+        assert float(item.find("actuator/mechanicalReduction").text) == 1
+
+
+HALF = np.sqrt(0.5)
+
+
+@pytest.mark.parametrize(
+    "orientation",
+    [
+        (1.0, 0.0, 0.0, 0.0),
+        (0.0, HALF, 0.0, HALF),  # the example's, which faces along x: roll and yaw turn about one axis there
+        (HALF, 0.0, HALF, 0.0),
+        (HALF, 0.0, -HALF, 0.0),
+        (0.5, 0.5, 0.5, -0.5),
+        (0.0, 1.0, 0.0, 0.0),
+        tuple(Rotation.from_euler("zyx", [0.7, np.pi / 2 - 1e-9, 0.2]).as_quat(scalar_first=True)),
+        *(tuple(q) for q in Rotation.random(4, rng=np.random.default_rng(5)).as_quat(scalar_first=True)),
+    ],
+)
+def test_a_palm_is_welded_to_the_world_where_it_is_told(orientation):
+    hand, position = odd_hand(), (0.1, -0.2, 0.3)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        text = hand_urdf(hand, world=(position, orientation))
+    model = pin.buildModelFromXML(text)
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, pin.neutral(model))
+    palm = data.oMf[model.getFrameId("palm")]
+    assert palm.translation == pytest.approx(position, abs=1e-12)
+    turn = Rotation.from_quat(orientation, scalar_first=True).as_matrix()
+    assert palm.rotation == pytest.approx(turn, abs=1e-9)
+    assert sorted(model.names)[:-1] == sorted(hand.joint_names)
+    rigid = [joint.get("name") for joint in ElementTree.fromstring(text).iter("joint") if joint.get("type") == "fixed"]
+    assert rigid == ["world_to_palm"]
+    # The rest is what stands nowhere.
+    alone = pin.buildModelFromXML(hand_urdf(hand))
+    other = alone.createData()
+    pin.framesForwardKinematics(alone, other, pin.neutral(alone))
+    link = palm.actInv(data.oMf[model.getFrameId("finger0_link2")])
+    assert link.translation == pytest.approx(other.oMf[alone.getFrameId("finger0_link2")].translation, abs=1e-12)
 
 
 def test_the_object_keeps_its_mass_inertia_and_shapes():
