@@ -22,6 +22,7 @@ from casadi_hands.pipeline.warm import as_floating, kept_margin, warm_start
 from casadi_hands.search.work import processes, start_up
 from casadi_hands.stages.model import build_model
 from casadi_hands.task import Task
+from casadi_hands.verify.simulation import load_mujoco
 
 _LOG = logging.getLogger(__name__)
 # What numbers may do from one start and not from another; CasADi raises RuntimeError.
@@ -61,6 +62,7 @@ def solve(
         SolveError: ``until`` is not a stage, or not the last where there is a start; or the start is of a task of
             another structure.
         DesignError: there is no result in ``start``.
+        HandsError: MuJoCo, which designs are replayed in, cannot be loaded.
     """
     if until not in STAGES:
         raise SolveError(f"until: given {until!r}; allowed: {', '.join(STAGES)}")
@@ -68,6 +70,8 @@ def solve(
         raise SolveError(f"from an earlier result only the stage {STAGES[-1]} is run; it cannot stop after {until}")
     if seed is not None:
         task = task.model_copy(update={"search": task.search.model_copy(update={"seed": seed})})
+    if until in STAGES[2:]:
+        load_mujoco()  # before hours of work, not after them
     jobs = jobs or os.cpu_count() or 1
     record = Record(task, out, progress or (lambda _: None))
     with processes(jobs) if executor is None else nullcontext(executor) as workers:
@@ -113,7 +117,8 @@ def _run(record: Record, until: str, executor: Executor | None, jobs: int) -> De
     judge = Judge(model, floating)
     if until == "whole_hand":
         run_whole_hand(record, model, floating, found.candidates[0])
-        return judge.judge(record.design, found.short)
+        judged = judge.judge(record.design, found.short)
+        return judge.replayed(judged, jobs) if judged.status == "certified" else judged
     return judge.concluded(Certifier(record, model, floating, search, judge, jobs).run(found), jobs)
 
 
