@@ -20,13 +20,15 @@ from casadi_hands.verify.contact import (
     slip_figure,
     spin_figure,
 )
+from casadi_hands.verify.disturbances import disturbed_figures
 from casadi_hands.verify.dynamics import Shots, between_residual, sample_residual, shoot
 from casadi_hands.verify.folder import Folder, read_folder
-from casadi_hands.verify.goals import goal_figures
+from casadi_hands.verify.goals import goal_figures, rest_figure
 from casadi_hands.verify.replays import REPLAYS, run_replays
 from casadi_hands.verify.report import Audit, Figure
 from casadi_hands.verify.structure import structure_problems
 from casadi_hands.verify.trajectory import build_trajectory, sample_placements
+from casadi_hands.verify.trust import limit_notes
 from casadi_hands.verify.wrench import disturbance_figure, torque_figure, unsupplied_figure
 
 
@@ -62,14 +64,16 @@ def audit_files(directory: str | Path, task: str | Path | None = None) -> Audit:
         DesignError: a file is missing or cannot be read as the format says.
         TaskError: ``task.yaml`` is not a task.
     """
-    folder = read_folder(directory)
-    problems = structure_problems(folder)
+    folder = read_folder(directory, task)
     shots, placed = shoot(folder), sample_placements(folder)
     path = build_trajectory(folder, shots)
+    problems = structure_problems(folder, path)
     figures = [
         Figure("structure", float(len(problems)), 0.0, "", "{value} disagreements within the files"),
         *goal_figures(folder),
+        rest_figure(folder, shots),
         *residual_figures(folder, shots),
+        *disturbed_figures(folder),
         *friction_figures(folder, placed),
         gap_at_samples(folder, placed),
         gap_between_samples(folder, path),
@@ -81,7 +85,7 @@ def audit_files(directory: str | Path, task: str | Path | None = None) -> Audit:
         unsupplied_figure(folder),
         disturbance_figure(folder, placed),
     ]
-    return Audit(folder.task.name, {figure.name: figure for figure in figures}, tuple(problems))
+    return Audit(folder.task.name, {figure.name: figure for figure in figures}, tuple(problems), limit_notes(folder))
 
 
 def residual_figures(folder: Folder, shots: Shots) -> list[Figure]:

@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from casadi_hands.verify.folder import Folder
-from casadi_hands.verify.report import Figure
+from casadi_hands.verify.report import Figure, worse
 from casadi_hands.verify.shapes import Body, body_distance
 from casadi_hands.verify.trajectory import DENSITY, Trajectory
 
@@ -15,8 +15,8 @@ from casadi_hands.verify.trajectory import DENSITY, Trajectory
 def body_pairs(folder: Folder) -> list[tuple[Body, Body]]:
     """Return every pair of bodies that must not overlap.
 
-    Neighbours in a chain share a joint and so touch; the palm and a finger's first link are neighbours too. Palm and
-    ground may not touch either.
+    Neighbours in a chain share a joint and so touch. The palm and a finger's first link share one, too, but that link
+    stands on the palm's face, clear of it. Palm and ground may not touch either.
     """
     bodies = [folder.object, *folder.links.values()]
     pairs = [pair for pair in combinations(bodies, 2) if not _neighbours(pair[0].name, pair[1].name)]
@@ -26,10 +26,8 @@ def body_pairs(folder: Folder) -> list[tuple[Body, Body]]:
 
 
 def _neighbours(first: str, second: str) -> bool:
-    if "object" in (first, second):
+    if not {"object", "palm"}.isdisjoint((first, second)):
         return False
-    if "palm" in (first, second):
-        return first.endswith("_link0") or second.endswith("_link0")
     (one, _, i), (other, _, j) = first.partition("_link"), second.partition("_link")
     return one == other and abs(int(i) - int(j)) < 2
 
@@ -42,10 +40,10 @@ def penetration_figure(folder: Folder, path: Trajectory) -> Figure:
         for i in range(0, len(path.time), DENSITY // 4):
             depth = -body_distance(first, path.at(first.name, i), second, path.at(second.name, i))
             k = path.interval[i]
-            depths[k] = max(depths[k], depth)
-            if depth > worst[0]:
+            depths[k] = np.fmax(depths[k], depth)
+            if not depth <= worst[0]:
                 names = f"{folder.call(first.name)} and {folder.call(second.name)}"
-                worst = (depth, f"{names} overlap by {{value}} at {path.time[i]:.3g} s")
+                worst = worse(worst, (depth, f"{names} overlap by {{value}} at {path.time[i]:.3g} s"))
     return Figure("penetration", worst[0], folder.task.limits.penetration, "m", worst[1], by_interval=depths)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.verify.folder import Folder
-from casadi_hands.verify.report import Figure
+from casadi_hands.verify.report import Figure, worse
 from casadi_hands.verify.shapes import body_distance
 from casadi_hands.verify.trajectory import DENSITY, Trajectory
 
@@ -43,19 +43,23 @@ def friction_figures(folder: Folder, placed: Placements) -> list[Figure]:
     excess = (-np.inf, "no contact is active")
     pull = (-np.inf, "no contact is active")
     use = (0.0, "no contact is active")
-    for k, c in active_contacts(folder):
-        force, friction = folder.motion.contact_force[k, c], folder.friction(c)
-        on_object, on_link = surface_normals(folder, placed, k, c)
-        for side, into_object in (("object", -on_object), ("finger", on_link)):
-            normal = float(force @ into_object)
-            tangential = float(np.linalg.norm(force - normal * into_object))
-            at = f"at contact '{folder.motion.contact_names[c]}' at {folder.motion.time[k]:.3g} s, {side}'s surface"
-            over = (tangential - friction * max(normal, 0.0)) / folder.weight
-            excess = max(excess, (over, f"tangential force exceeds friction by {{value}} {at}"))
-            pull = max(pull, (-normal / folder.weight, f"the object is pulled with {{value}} {at}"))
-            if tangential > 0.0:
-                share = tangential / (friction * normal) if normal > 0.0 else np.inf
-                use = max(use, (share, f"{{value}} of the friction is in use {at}"))
+    for scenario, forces, rows in folder.scenarios():
+        for k, c in active_contacts(folder):
+            if not rows[k]:
+                continue
+            force, friction = forces[k, c], folder.friction(c)
+            on_object, on_link = surface_normals(folder, placed, k, c)
+            for side, into_object in (("object", -on_object), ("finger", on_link)):
+                normal = float(force @ into_object)
+                tangential = float(np.linalg.norm(force - normal * into_object))
+                contact = f"at contact '{folder.motion.contact_names[c]}' at {folder.motion.time[k]:.3g} s"
+                at = f"{contact}, {side}'s surface{scenario}"
+                over = (tangential - friction * max(normal, 0.0)) / folder.weight
+                excess = worse(excess, (over, f"tangential force exceeds friction by {{value}} {at}"))
+                pull = worse(pull, (-normal / folder.weight, f"the object is pulled with {{value}} {at}"))
+                if tangential > 0.0:
+                    share = tangential / (friction * normal) if normal > 0.0 else np.inf
+                    use = worse(use, (share, f"{{value}} of the friction is in use {at}"))
     limits = folder.task.limits
     return [
         Figure("friction_excess", excess[0], limits.friction_excess, "weight", excess[1]),
@@ -91,7 +95,7 @@ def gap_at_samples(folder: Folder, placed: Placements) -> Figure:
             (body_distance(folder.object, (rotation, position), other, link_placed), "has a gap of {value}"),
         )
         for value, words in cases:
-            worst = max(worst, (value, f"contact '{motion.contact_names[c]}' {words} at {motion.time[k]:.3g} s"))
+            worst = worse(worst, (value, f"contact '{motion.contact_names[c]}' {words} at {motion.time[k]:.3g} s"))
     return Figure("gap", worst[0], folder.task.limits.gap, "m", worst[1])
 
 
@@ -108,7 +112,7 @@ def gap_between_samples(folder: Folder, path: Trajectory) -> Figure:
                 continue
             distance = body_distance(folder.object, path.at("object", i), other, path.at(link, i))
             gaps[path.interval[i]] = max(gaps[path.interval[i]], distance)
-            worst = max(worst, (distance, f"contact '{name}' has a gap of {{value}} at {path.time[i]:.4g} s"))
+            worst = worse(worst, (distance, f"contact '{name}' has a gap of {{value}} at {path.time[i]:.4g} s"))
     return Figure("gap_between", worst[0], folder.task.limits.gap_between, "m", worst[1], by_interval=gaps)
 
 
@@ -127,7 +131,7 @@ def slip_figure(folder: Folder, path: Trajectory) -> Figure:
         for first, last in active_runs(folder, c):
             slip = float(np.sum(steps[first:last]))
             words = f"contact '{name}' slips {{value}} between {motion.time[first]:.3g} s and {motion.time[last]:.3g} s"
-            worst = max(worst, (slip, words))
+            worst = worse(worst, (slip, words))
             runs.append(np.zeros_like(steps))
             runs[-1][first:last] = steps[first:last]
     return Figure("slip", worst[0], folder.task.limits.slip, "m", worst[1], by_interval=np.array(runs))
@@ -149,7 +153,7 @@ def spin_figure(folder: Folder, path: Trajectory) -> Figure:
             spun = [float(turns[i] @ folder.object.normal(_contact_point(folder, path, c, i)[0])) for i in inside]
             angle = float(np.rad2deg(np.max(np.abs(np.cumsum(spun)), initial=0.0)))
             words = f"contact '{name}' spins {{value}} about its normal between {motion.time[first]:.3g} s and"
-            worst = max(worst, (angle, f"{words} {motion.time[last]:.3g} s"))
+            worst = worse(worst, (angle, f"{words} {motion.time[last]:.3g} s"))
     return Figure("spin", worst[0], None, "deg", worst[1])
 
 

@@ -17,6 +17,8 @@ from scipy.spatial.transform import Rotation
 
 from casadi_hands.verify.folder import Folder
 
+AT_REST = 1e-4
+"""Of the unit of speed: an object that moves so slowly is at rest, with a few billionths of its weight's energy."""
 FARTHEST_SHOT = 2 * np.pi
 """rad that a shot may be corrected by."""
 FASTEST = 100.0
@@ -164,6 +166,19 @@ def _quaternion_rate(quaternion: np.ndarray, omega: np.ndarray) -> np.ndarray:
     w, v = quaternion[..., :1], quaternion[..., 1:]
     turned = -np.sum(v * omega, axis=-1, keepdims=True)
     return 0.5 * np.concatenate([turned, w * omega + np.cross(v, omega)], axis=-1)
+
+
+def end_speeds(folder: Folder, shots: Shots) -> np.ndarray:
+    """Return the speeds (2,) of the object's fastest point at the motion's start and end, m/s."""
+    velocities = np.linalg.norm([shots.launch_velocity[0], shots.arrival_velocity[-1]], axis=1)
+    rates = np.linalg.norm([shots.launch_rate[0], shots.arrival_rate[-1]], axis=1)
+    speeds: np.ndarray = velocities + folder.length * rates
+    return speeds
+
+
+def still(folder: Folder) -> float:
+    """Return the speed, m/s, up to which the object is at rest."""
+    return AT_REST * folder.speed_unit
 
 
 def sample_residual(folder: Folder, shots: Shots) -> tuple[np.ndarray, np.ndarray]:

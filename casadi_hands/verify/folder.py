@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import json
+import hashlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,7 +15,10 @@ import pinocchio as pin
 from casadi_hands.design import Motion
 from casadi_hands.errors import DesignError
 from casadi_hands.task import Task, load_task
-from casadi_hands.verify.shapes import Body, ground_body, read_bodies
+from casadi_hands.verify.robot import Joint, Robot, read_robot
+from casadi_hands.verify.scene_file import Scene, read_scene
+from casadi_hands.verify.shapes import Body, ground_body
+from casadi_hands.verify.stored import read_motion, read_record
 
 STANDARD_GRAVITY = 9.81
 """m/s²; scales forces when the task has no gravity."""
@@ -26,20 +30,32 @@ class Folder:
 
     Attributes:
         path: the folder.
-        task: from ``task.yaml``.
+        task: by which the folder is judged: from ``task.yaml``, or a file that the user trusts.
+        written: from ``task.yaml``.
+        trusted: the file that the user trusts, or None.
         motion: from ``motion.npz``.
         result: ``result.json``.
         links: URDF link name -> body, palm first.
+        joints: URDF joint name -> joint.
         object: from ``object.urdf``; its frame's origin is the centre of mass.
+        scene: from ``scene.xml``; None where there is none.
+        task_hash: SHA-256 of ``task.yaml``.
+        strange: what the two URDF files hold that the format does not have, a sentence each.
         model: numeric Pinocchio model of ``hand.urdf``; its world is the palm's frame.
     """
 
     path: Path
     task: Task
+    written: Task
+    trusted: Path | None
     motion: Motion
     result: dict[str, Any]
     links: dict[str, Body]
+    joints: dict[str, Joint]
     object: Body
+    scene: Scene | None
+    task_hash: str
+    strange: tuple[str, ...]
     model: pin.Model
 
     @cached_property
@@ -60,9 +76,24 @@ class Folder:
         return float(self.task.object.mass) * (float(np.linalg.norm(self.gravity)) or STANDARD_GRAVITY)
 
     @cached_property
+    def speed_unit(self) -> float:
+        """The unit of speed, m/s: half the object's extent, fallen from rest, gives it the square root of two of it."""
+        return float(np.sqrt(self.weight / self.task.object.mass * self.length))
+
+    @cached_property
     def ground(self) -> Body | None:
         """The ground as a body, or None."""
         return None if self.task.ground is None else ground_body(float(self.task.ground.height))
+
+    @cached_property
+    def fingers(self) -> list[str]:
+        """The task's names of the hand's fingers; a finger of the task whose contact never acts is not built."""
+        return [name for name in self.task.fingers if name in self.motion.contact_names]
+
+    @property
+    def legacy(self) -> bool:
+        """Whether an earlier version wrote the folder, which said less."""
+        return "task_hash" not in self.result
 
     def friction(self, contact: int) -> float:
         """Return the friction coefficient of the contact with this index."""
@@ -74,22 +105,36 @@ class Folder:
         """Return, for each column of the motion's angles, its index in the model's configuration."""
         return [self.model.joints[self.model.getJointId(name)].idx_q for name in self.motion.joint_names]
 
+    def scenarios(self) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
+        """Yield how to call it, the contact forces (S, C, 3) and the samples (S,) it is about, of each scenario.
+
+        They are the plan, and the plan under the task's disturbances, at the samples where its forces are others.
+        """
+        plan, disturbed = self.motion.contact_force, self.motion.contact_force_disturbed
+        yield "", plan, np.ones(len(self.motion.time), dtype=bool)
+        if disturbed is not None:
+            yield " under the task's perturbations", disturbed, np.any(disturbed != plan, axis=(1, 2))
+
     def call(self, body: str) -> str:
         """Return a body's name as the user knows it: ``finger0_link1`` -> ``finger 'thumb' (link 1)``."""
         finger, _, link = body.partition("_link")
-        if not link:
+        number = finger.removeprefix("finger")
+        if not link or not number.isdecimal():
             return f"the {body}"
-        names = list(self.task.fingers)
-        index = int(finger.removeprefix("finger"))
-        return f"finger '{names[index] if index < len(names) else index}' (link {link})"
+        index = int(number)
+        return f"finger '{self.fingers[index] if index < len(self.fingers) else index}' (link {link})"
 
 
-def read_folder(directory: str | Path) -> Folder:
+def read_folder(directory: str | Path, task: str | Path | None = None) -> Folder:
     """Read a result folder.
+
+    Args:
+        directory: the folder.
+        task: the task file to judge by; the folder's own by default.
 
     Raises:
         DesignError: a file is missing or unreadable, an array has the wrong shape, or a name has no counterpart.
-        TaskError: ``task.yaml`` is not a task.
+        TaskError: ``task.yaml``, or the file to judge by, is not a task.
     """
     path = Path(directory)
     if not path.is_dir():
@@ -97,73 +142,64 @@ def read_folder(directory: str | Path) -> Folder:
     for name in ("task.yaml", "hand.urdf", "object.urdf", "motion.npz", "result.json"):
         if not (path / name).is_file():
             raise DesignError(f"{path / name}: missing; the design has no complete motion to check")
-    links = read_bodies(path / "hand.urdf")
-    bodies = read_bodies(path / "object.urdf")
-    if "object" not in bodies or not bodies["object"].capsules or bodies["object"].cylinders:
-        raise DesignError(f"{path / 'object.urdf'}: no link 'object' made of spheres and capsules")
-    try:
-        result = json.loads((path / "result.json").read_text(encoding="utf-8"))
-        model = pin.buildModelFromUrdf(str(path / "hand.urdf"))
-    except ValueError as error:
-        raise DesignError(f"{path}: {error}") from None
-    if not isinstance(result, dict) or result.get("format") != 1:
-        raise DesignError(f"{path / 'result.json'}: not a result of format 1")
-    motion = _read_motion(path / "motion.npz")
-    folder = Folder(path, load_task(path / "task.yaml"), motion, result, links, bodies["object"], model)
+    hand, object_file = read_robot(path / "hand.urdf"), read_robot(path / "object.urdf")
+    written = load_task(path / "task.yaml")
+    folder = Folder(
+        path=path,
+        task=written if task is None else load_task(task),
+        written=written,
+        trusted=None if task is None else Path(task),
+        motion=read_motion(path / "motion.npz"),
+        result=read_record(path / "result.json"),
+        links=hand.links,
+        joints=hand.joints,
+        object=_object(path / "object.urdf", object_file),
+        scene=read_scene(path / "scene.xml") if (path / "scene.xml").is_file() else None,
+        task_hash=hashlib.sha256((path / "task.yaml").read_bytes()).hexdigest(),
+        strange=(*hand.strange, *object_file.strange),
+        model=_model(path / "hand.urdf", hand),
+    )
     _check_names(folder)
     return folder
 
 
-def _read_motion(path: Path) -> Motion:
-    names: list[str] = []
-    optional: list[str] = []
-    for name, item in Motion.__dataclass_fields__.items():
-        (optional if item.default is None else names).append(name)
+def _object(path: Path, robot: Robot) -> Body:
+    """Return the object's body.
+
+    Raises:
+        DesignError: the file holds anything else, or the body has no surface.
+    """
+    if list(robot.links) != ["object"] or robot.joints:
+        found = ", ".join([*(f"'{name}'" for name in robot.links), *(f"joint '{name}'" for name in robot.joints)])
+        raise DesignError(f"{path}: holds {found or 'no link'}; it must hold one link 'object' and nothing else")
+    body = robot.links["object"]
+    if not body.capsules or body.cylinders:
+        raise DesignError(f"{path}: no link 'object' made of spheres and capsules")
+    return body
+
+
+def _model(path: Path, robot: Robot) -> pin.Model:
+    """Build the model of ``hand.urdf``.
+
+    Raises:
+        DesignError: its joints do not make a tree of its links that stands on the palm.
+    """
+    children = [joint.child for joint in robot.joints.values()]
+    for name, joint in robot.joints.items():
+        for role, link in (("parent", joint.parent), ("child", joint.child)):
+            if link not in robot.links:
+                raise DesignError(f"{path}: the {role} of joint {name} is '{link}', no link of the file")
+        if np.linalg.norm(joint.axis) < 1e-6:
+            raise DesignError(f"{path}: joint {name} turns about no axis")
+    if "palm" not in robot.links:
+        raise DesignError(f"{path}: no link 'palm'")
+    loose = [name for name in robot.links if name != "palm" and children.count(name) != 1]
+    if loose or "palm" in children:
+        raise DesignError(f"{path}: link '{(loose or ['palm'])[0]}' does not hang on one joint of the hand")
     try:
-        with np.load(path, allow_pickle=False) as file:
-            missing = [name for name in names if name not in file]
-            if missing:
-                raise DesignError(f"{path}: no array {', '.join(missing)}")
-            arrays = {name: file[name] for name in [*names, *optional] if name in file}
-    except (OSError, ValueError) as error:
-        raise DesignError(f"{path}: not a NumPy archive: {error}") from None
-    samples, joints, contacts = (arrays[key].size for key in ("time", "joint_names", "contact_names"))
-    shapes = {
-        "time": (samples,),
-        "object_position": (samples, 3),
-        "object_orientation": (samples, 4),
-        "base_position": (samples, 3),
-        "base_orientation": (samples, 4),
-        "joint_angles": (samples, joints),
-        "joint_names": (joints,),
-        "contact_names": (contacts,),
-        "contact_link": (contacts,),
-        "contact_active": (samples, contacts),
-        "contact_force": (samples, contacts, 3),
-        "contact_point_object": (samples, contacts, 3),
-        "contact_point_link": (samples, contacts, 3),
-        "external_force": (samples, 3),
-        "external_torque": (samples, 3),
-        "joint_velocities": (samples, joints),
-        "joint_torques": (samples, joints),
-        "joint_commands": (samples, joints),
-        "contact_force_disturbed": (samples, contacts, 3),
-        "external_force_disturbed": (samples, 3),
-        "external_torque_disturbed": (samples, 3),
-    }
-    for name, shape in shapes.items():
-        if name not in arrays:
-            continue
-        if arrays[name].shape != shape:
-            raise DesignError(f"{path}: {name} has shape {arrays[name].shape}, not {shape}")
-        if arrays[name].dtype.kind == "f" and not np.all(np.isfinite(arrays[name])):
-            raise DesignError(f"{path}: {name} holds a number that is not finite")
-    if samples < 3 or not np.all(np.diff(arrays["time"]) > 0):
-        raise DesignError(f"{path}: time must hold at least three increasing samples")
-    if min(np.linalg.norm(arrays[f"{who}_orientation"], axis=1).min() for who in ("object", "base")) < 1e-3:
-        raise DesignError(f"{path}: an orientation is the zero quaternion")
-    words = {name: tuple(str(word) for word in arrays[name]) for name in names if arrays[name].dtype.kind in "US"}
-    return Motion(**{**arrays, **words, "contact_active": arrays["contact_active"].astype(bool)})
+        return pin.buildModelFromUrdf(str(path))
+    except (ValueError, RuntimeError) as error:
+        raise DesignError(f"{path}: {error}") from None
 
 
 def _check_names(folder: Folder) -> None:
@@ -178,3 +214,5 @@ def _check_names(folder: Folder) -> None:
             raise DesignError(f"{folder.path / 'motion.npz'}: contact '{name}' is with the ground; the task has none")
         if link != "ground" and link not in folder.links:
             raise DesignError(f"{folder.path / 'motion.npz'}: contact '{name}' is on '{link}', no link of hand.urdf")
+        if link != "ground" and not folder.links[link].capsules:
+            raise DesignError(f"{folder.path / 'hand.urdf'}: {folder.call(link)} has no capsule, which would touch")

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import reduce
+
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from casadi_hands.verify.dynamics import object_rotation
+from casadi_hands.verify.dynamics import Shots, end_speeds, object_rotation, still
 from casadi_hands.verify.folder import Folder
-from casadi_hands.verify.report import Figure
+from casadi_hands.verify.report import Figure, worse
 
 
 def goal_figures(folder: Folder) -> list[Figure]:
@@ -31,10 +33,18 @@ def goal_figures(folder: Folder) -> list[Figure]:
         if task.tool is None:
             angle = float(np.rad2deg((Rotation.from_rotvec(goal.rotation.vector).inv() * rotation).magnitude()))
             angles.append((angle, f"the object is turned {{value}} from goal {number} at {goal.at:.3g} s"))
-    figures = [Figure("goal_position", *_split(max(distances), limits.goal_position, "m"))]
+    figures = [Figure("goal_position", *_split(reduce(worse, distances), limits.goal_position, "m"))]
     if angles:
-        figures.append(Figure("goal_angle", *_split(max(angles), limits.goal_angle, "deg")))
+        figures.append(Figure("goal_angle", *_split(reduce(worse, angles), limits.goal_angle, "deg")))
     return figures
+
+
+def rest_figure(folder: Folder, shots: Shots) -> Figure:
+    """Return the larger speed of the object's fastest point at the motion's start and end, m/s: it rests at both."""
+    speeds, words = end_speeds(folder, shots), ("starts", "ends")
+    k = int(np.argmax(speeds))
+    finding = f"the object {words[k]} with {{value}}; a motion starts and ends at rest"
+    return Figure("rest", float(speeds[k]), still(folder), "m/s", finding)
 
 
 def _split(worst: tuple[float, str], limit: float, unit: str) -> tuple[float, float, str, str]:

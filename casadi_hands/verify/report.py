@@ -15,8 +15,23 @@ _UNITS = {
     "N·m": (1.0, " N·m"),
     "rad/s": (1.0, " rad/s"),
     "share": (100.0, " %"),
+    "m/s": (1000.0, " mm/s"),
     "": (1.0, ""),
 }
+
+UNIT_OF = {
+    **dict.fromkeys(("goal_position", "penetration", "gap", "gap_between", "slip", "replay_position"), "m"),
+    **dict.fromkeys(("goal_angle", "joint_limit", "replay_angle"), "deg"),
+    **dict.fromkeys(("residual", "residual_between", "friction_excess", "pull", "unsupplied_force"), "weight"),
+    **dict.fromkeys(("speed", "torque", "replay_dropped"), "share"),
+    "disturbance_radius": "weight",
+}
+"""Units of the limits."""
+
+
+def worse(one: tuple[float, str], other: tuple[float, str]) -> tuple[float, str]:
+    """Return the larger of two values with their findings; what is not a number is larger than all."""
+    return other if math.isnan(other[0]) or other[0] > one[0] else one
 
 
 def show(value: float, unit: str) -> str:

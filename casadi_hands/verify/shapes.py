@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from pathlib import Path
-from xml.etree import ElementTree
 
 import coal
 import numpy as np
 from scipy.spatial.transform import Rotation
-
-from casadi_hands.errors import DesignError
 
 
 @dataclass(frozen=True)
@@ -100,80 +96,8 @@ class Body:
         return point - float(capsule.distance(point)) * capsule.normal(point)
 
 
-def read_bodies(path: Path) -> dict[str, Body]:
-    """Read every link of a URDF made of spheres and cylinders.
-
-    A cylinder with a sphere of its radius at either end is read as the capsule they form.
-
-    Raises:
-        DesignError: the file is missing, is not XML, or holds a shape that is neither sphere nor cylinder.
-    """
-    try:
-        root = ElementTree.parse(path).getroot()
-    except FileNotFoundError:
-        raise DesignError(f"{path}: missing") from None
-    except ElementTree.ParseError as error:
-        raise DesignError(f"{path}: not XML: {error}") from None
-    return {name: _read_link(path, name, link) for link in root.iter("link") if (name := link.get("name", ""))}
-
-
-def _numbers(text: str | None, default: str = "0 0 0") -> np.ndarray:
-    return np.array([float(word) for word in (text or default).split()])
-
-
-def _placement(element: ElementTree.Element) -> np.ndarray:
-    placement = np.eye(4)
-    origin = element.find("origin")
-    if origin is not None:
-        placement[:3, :3] = Rotation.from_euler("xyz", _numbers(origin.get("rpy"))).as_matrix()
-        placement[:3, 3] = _numbers(origin.get("xyz"))
-    return placement
-
-
-def _read_link(path: Path, name: str, link: ElementTree.Element) -> Body:
-    spheres: list[Capsule] = []
-    cylinders: list[Cylinder] = []
-    for collision in link.findall("collision"):
-        placement = _placement(collision)
-        sphere, cylinder = collision.find("geometry/sphere"), collision.find("geometry/cylinder")
-        if sphere is not None:
-            spheres.append(Capsule(placement[:3, 3], placement[:3, 3], float(sphere.get("radius", "nan"))))
-        elif cylinder is not None:
-            cylinders.append(
-                Cylinder(placement, float(cylinder.get("radius", "nan")), float(cylinder.get("length", "nan")))
-            )
-        else:
-            raise DesignError(f"{path}: link {name}: its collision geometry is neither sphere nor cylinder")
-    capsules, cylinders = _merge(spheres, cylinders)
-    mass, center, inertia = _inertial(link)
-    return Body(name, mass, center, inertia, tuple(capsules), tuple(cylinders), _solids(capsules, cylinders))
-
-
-def _inertial(link: ElementTree.Element) -> tuple[float, np.ndarray, np.ndarray]:
-    inertial = link.find("inertial")
-    if inertial is None:
-        return 0.0, np.zeros(3), np.zeros((3, 3))
-    placement = _placement(inertial)
-    mass, tensor = inertial.find("mass"), inertial.find("inertia")
-    entries = (
-        {key: float(tensor.get(key, "0")) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")}
-        if (tensor is not None)
-        else dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), 0.0)
-    )
-    local = np.array(
-        [
-            [entries["ixx"], entries["ixy"], entries["ixz"]],
-            [entries["ixy"], entries["iyy"], entries["iyz"]],
-            [entries["ixz"], entries["iyz"], entries["izz"]],
-        ]
-    )
-    rotation = placement[:3, :3]
-    value = float(mass.get("value", "nan")) if mass is not None else 0.0
-    return value, placement[:3, 3], rotation @ local @ rotation.T
-
-
-def _merge(spheres: list[Capsule], cylinders: list[Cylinder]) -> tuple[list[Capsule], list[Cylinder]]:
-    """Join each cylinder and its two end spheres into a capsule; keep what does not form one."""
+def merge(spheres: list[Capsule], cylinders: list[Cylinder]) -> tuple[list[Capsule], list[Cylinder]]:
+    """Return capsules, joined of each cylinder and its two end spheres, and what does not form one."""
     capsules: list[Capsule] = []
     bare: list[Cylinder] = []
     unused = spheres
@@ -201,7 +125,7 @@ def _sphere_at(spheres: list[Capsule], center: np.ndarray, radius: float) -> Cap
     return None
 
 
-def _solids(
+def solids(
     capsules: list[Capsule], cylinders: list[Cylinder]
 ) -> tuple[tuple[coal.CollisionGeometry, np.ndarray, np.ndarray], ...]:
     """Return coal's shapes with their rotation (3, 3) and position (3,) in the body's frame."""
@@ -224,6 +148,37 @@ def ground_body(height: float) -> Body:
     """Return the half-space below the world's z = ``height`` (m) as a body that rests in the world's frame."""
     solid = coal.Halfspace(np.array([0.0, 0.0, 1.0]), height)
     return Body("ground", 0.0, np.zeros(3), np.zeros((3, 3)), (), (), ((solid, np.eye(3), np.zeros(3)),))
+
+
+def is_capsule(capsule: Capsule, start: np.ndarray, end: np.ndarray, radius: float) -> bool:
+    """Whether a capsule has these ends, either way around, and this radius, to a millionth of its size."""
+    near = 1e-6 * max(radius, float(np.linalg.norm(end - start)))
+    straight = np.linalg.norm(capsule.start - start) + np.linalg.norm(capsule.end - end)
+    turned = np.linalg.norm(capsule.start - end) + np.linalg.norm(capsule.end - start)
+    return bool(min(straight, turned) < near and abs(capsule.radius - radius) < near)
+
+
+def swept_inertial(
+    slices: list[tuple[float, float, float, float]], middle: float, density: float
+) -> tuple[float, np.ndarray]:
+    """Return mass (kg) and inertia (3, 3) about ``z = middle`` of a solid of revolution about z.
+
+    Args:
+        slices: from z to z, m, and the radius at either end, m: equal for a cylinder, one zero for half a ball.
+        middle: m.
+        density: kg/m³.
+    """
+    nodes, shares = np.polynomial.legendre.leggauss(5)
+    mass = along = across = 0.0
+    for low, high, first, last in slices:
+        z, weight = 0.5 * (low + high) + 0.5 * (high - low) * nodes, 0.5 * (high - low) * shares
+        flat = high if first < last else low
+        square = np.full_like(z, first**2) if first == last else max(first, last) ** 2 - (z - flat) ** 2
+        disc = np.pi * density * square * weight
+        mass += float(disc.sum())
+        along += float((disc * square / 2).sum())
+        across += float((disc * (square / 4 + (z - middle) ** 2)).sum())
+    return mass, np.diag([across, across, along])
 
 
 _REQUEST = coal.DistanceRequest()

@@ -17,11 +17,9 @@ import pinocchio as pin
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from casadi_hands.verify.dynamics import Shots, object_rotation
+from casadi_hands.verify.dynamics import Shots, end_speeds, object_rotation, still
 from casadi_hands.verify.folder import Folder
 
-AT_REST = 1e-4
-"""m/s and rad/s."""
 DENSITY = 8
 """Dense times from a sample to the next: 12.5 ms apart at 0.1 s."""
 
@@ -58,7 +56,7 @@ def build_trajectory(folder: Folder, shots: Shots) -> Trajectory:
     interval = np.append(np.repeat(np.arange(count), DENSITY), count - 1)
     fraction = np.append(fraction, 1.0)
     time = samples[interval] + fraction * steps[interval]
-    joints, speeds = _joints(folder, time, _rests(shots))
+    joints, speeds = _joints(folder, time, _rests(folder, shots))
     base_rotation, base_position = _base(folder, interval, fraction)
     placed = place_links(folder, joints, base_rotation, base_position)
     placed["object"] = _object(folder, shots, interval, fraction)
@@ -101,11 +99,10 @@ def place_links(
     return {name: (rotation[name], position[name]) for name in frames}
 
 
-def _rests(shots: Shots) -> tuple[bool, bool]:
+def _rests(folder: Folder, shots: Shots) -> tuple[bool, bool]:
     """Return whether the object is at rest at the first and at the last sample."""
-    first = np.concatenate([shots.launch_velocity[0], shots.launch_rate[0]])
-    last = np.concatenate([shots.arrival_velocity[-1], shots.arrival_rate[-1]])
-    return bool(np.linalg.norm(first) < AT_REST), bool(np.linalg.norm(last) < AT_REST)
+    first, last = end_speeds(folder, shots) <= still(folder)
+    return bool(first), bool(last)
 
 
 def _joints(folder: Folder, time: np.ndarray, rests: tuple[bool, bool]) -> tuple[np.ndarray, np.ndarray]:

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from casadi_hands.verify.contact import Placements, active_contacts, surface_normals
 from casadi_hands.verify.folder import Folder
-from casadi_hands.verify.report import Figure
+from casadi_hands.verify.report import Figure, worse
 
 LEAST_LEVER = 0.05
 """A direction of force counts as supplied when its lever is at least this share of half the object's extent."""
@@ -29,35 +29,45 @@ def contact_jacobian(folder: Folder, data: pin.Data, k: int, c: int) -> np.ndarr
     frame = model.getFrameId(folder.motion.contact_link[c])
     pin.computeJointJacobians(model, data, configuration)
     pin.updateFramePlacements(model, data)
-    twist = pin.getFrameJacobian(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)[:, columns]
+    twist = pin.getFrameJacobian(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+    twist = np.reshape(twist, (6, model.nv))[:, columns]  # that of one joint comes as a vector
     arm = data.oMf[frame].rotation @ folder.motion.contact_point_link[k, c]
     jacobian: np.ndarray = twist[:3] - pin.skew(arm) @ twist[3:]
     return jacobian
 
 
-def planned_torques(folder: Folder) -> np.ndarray:
-    """Return the joint torques (S, J) that press the contacts with their stated forces, N·m; links weigh nothing."""
+def planned_torques(folder: Folder, forces: np.ndarray | None = None) -> np.ndarray:
+    """Return the joint torques (S, J) that press the contacts with forces (S, C, 3), N·m; links weigh nothing.
+
+    Args:
+        folder: the design.
+        forces: N, world; those of the plan by default.
+    """
+    forces = folder.motion.contact_force if forces is None else forces
     torques = np.zeros_like(folder.motion.joint_angles)
     data = folder.model.createData()
     for k, c in active_contacts(folder):
         if folder.motion.contact_link[c] != "ground":
-            torques[k] += contact_jacobian(folder, data, k, c).T @ force_in_palm(folder, k, c)
+            torques[k] += contact_jacobian(folder, data, k, c).T @ in_palm(folder, k, forces[k, c])
     return torques
 
 
-def force_in_palm(folder: Folder, k: int, c: int) -> np.ndarray:
-    """Return the force (3,) on the object at a contact, palm frame, N."""
+def in_palm(folder: Folder, k: int, force: np.ndarray) -> np.ndarray:
+    """Return a force (3,) in the world at a sample, in the palm's frame."""
     base = Rotation.from_quat(folder.motion.base_orientation[k], scalar_first=True)
-    force: np.ndarray = base.apply(folder.motion.contact_force[k, c], inverse=True)
-    return force
+    turned: np.ndarray = base.apply(force, inverse=True)
+    return turned
 
 
 def torque_figure(folder: Folder) -> Figure:
     """Return the largest joint torque: a share of the actuator's where the task names one, else in N·m."""
-    torques = np.abs(planned_torques(folder))
-    k, j = np.unravel_index(np.argmax(torques), torques.shape)
-    where = f"joint {folder.motion.joint_names[j]} at {folder.motion.time[k]:.3g} s"
-    value = float(torques[k, j])
+    worst = (0.0, "no joint presses")
+    for scenario, forces, _ in folder.scenarios():
+        torques = np.abs(planned_torques(folder, forces))
+        k, j = np.unravel_index(np.argmax(torques), torques.shape)
+        where = f"joint {folder.motion.joint_names[j]} at {folder.motion.time[k]:.3g} s{scenario}"
+        worst = worse(worst, (float(torques[k, j]), where))
+    value, where = worst
     if folder.task.actuator is None:
         return Figure("torque", value, None, "N·m", f"{{value}} in {where}")
     share = value / folder.task.actuator.torque
@@ -76,10 +86,13 @@ def unsupplied_figure(folder: Folder) -> Figure:
             continue
         directions, levers, _ = np.linalg.svd(contact_jacobian(folder, data, k, c))
         kept = directions[:, : len(levers)][:, levers >= LEAST_LEVER * folder.length]
-        force = force_in_palm(folder, k, c)
-        left = float(np.linalg.norm(force - kept @ (kept.T @ force))) / folder.weight
-        at = f"contact '{folder.motion.contact_names[c]}' at {folder.motion.time[k]:.3g} s"
-        worst = max(worst, (left, f"no joint supplies a force of {{value}} of {at}"))
+        for scenario, forces, rows in folder.scenarios():
+            if not rows[k]:
+                continue
+            force = in_palm(folder, k, forces[k, c])
+            left = float(np.linalg.norm(force - kept @ (kept.T @ force))) / folder.weight
+            at = f"contact '{folder.motion.contact_names[c]}' at {folder.motion.time[k]:.3g} s{scenario}"
+            worst = worse(worst, (left, f"no joint supplies a force of {{value}} of {at}"))
     return Figure("unsupplied_force", worst[0], folder.task.limits.unsupplied_force, "weight", worst[1])
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,6 +14,8 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.design import Finger, Hand, Link, Motion
+from casadi_hands.export.commands import commanded
+from casadi_hands.export.mjcf import scene_mjcf
 from casadi_hands.task import Task, load_task, task_to_yaml
 
 
@@ -26,14 +29,22 @@ class Scene:
     changes: dict[str, Any] = field(default_factory=dict)
 
     def write(self, directory: Path) -> Path:
-        """Write task.yaml, hand.urdf, object.urdf, motion.npz and result.json."""
+        """Write task.yaml, hand.urdf, object.urdf, scene.xml, motion.npz and result.json.
+
+        A motion without commands is written with those that go with it.
+        """
         directory.mkdir(parents=True, exist_ok=True)
+        motion = self.motion
+        if motion.joint_commands is None:
+            motion = commanded(self.task, self.hand, motion)
         (directory / "task.yaml").write_text(task_to_yaml(self.task))
         (directory / "hand.urdf").write_text(hand_urdf(self.hand))
         (directory / "object.urdf").write_text(object_urdf(self.task))
-        arrays = {name: np.asarray(getattr(self.motion, name)) for name in Motion.__dataclass_fields__}
-        np.savez(directory / "motion.npz", **arrays)
-        (directory / "result.json").write_text(json.dumps({**result(self.task, self.hand), **self.changes}))
+        (directory / "scene.xml").write_text(scene_mjcf(self.task, self.hand, motion))
+        given = {name: getattr(motion, name) for name in Motion.__dataclass_fields__}
+        np.savez(directory / "motion.npz", **{name: np.asarray(a) for name, a in given.items() if a is not None})
+        record = result(self.task, self.hand, len(motion.time))
+        (directory / "result.json").write_text(json.dumps({**record, **self.changes}))
         return directory
 
     def moved(self, **arrays: Any) -> Scene:
@@ -65,19 +76,37 @@ def _inertial(link: ElementTree.Element, mass: float, center: Any, inertia: np.n
 
 def _capsule(link: ElementTree.Element, start: Any, end: Any, radius: float) -> None:
     start, end = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
-    for at in (start, end) if np.any(start != end) else (start,):
-        collision = _element(link, "collision")
-        _element(collision, "origin", xyz=at)
-        _element(_element(collision, "geometry"), "sphere", radius=radius)
     axis = end - start
-    if np.any(axis):
-        length = float(np.linalg.norm(axis))
-        x, y, z = axis / length
-        collision = _element(link, "collision")
-        # Rolling by a about x and pitching by b about y takes z to (sin b cos a, -sin a, cos b cos a).
-        roll = np.arcsin(-y)
-        _element(collision, "origin", xyz=(start + end) / 2, rpy=[roll, np.arctan2(x, z), 0.0])
-        _element(_element(collision, "geometry"), "cylinder", radius=radius, length=length)
+    for role in ("visual", "collision"):
+        for at in (start, end) if np.any(axis) else (start,):
+            _shape(link, role, "sphere", at, [0.0, 0.0, 0.0], radius=radius)
+        if np.any(axis):
+            length = float(np.linalg.norm(axis))
+            x, y, z = axis / length
+            # Rolling by a about x and pitching by b about y takes z to (sin b cos a, -sin a, cos b cos a).
+            turn = [np.arcsin(-y), np.arctan2(x, z), 0.0]
+            _shape(link, role, "cylinder", (start + end) / 2, turn, radius=radius, length=length)
+
+
+def _shape(link: ElementTree.Element, role: str, kind: str, at: Any, turn: Any, **sizes: float) -> None:
+    element = _element(link, role)
+    _element(element, "origin", xyz=at, rpy=turn)
+    _element(_element(element, "geometry"), kind, **sizes)
+
+
+def _disc_inertia(mass: float, radius: float, thickness: float) -> np.ndarray:
+    across = mass * (3 * radius**2 + thickness**2) / 12
+    return np.diag([across, across, mass * radius**2 / 2])
+
+
+def _capsule_inertia(mass: float, radius: float, length: float) -> np.ndarray:
+    """A cylinder and a ball cut in two, by the parallel axes' theorem, applied to half a ball twice."""
+    rod = mass * length / (length + 4 / 3 * radius)
+    ball = mass - rod
+    across = rod * (3 * radius**2 + length**2) / 12
+    # About its own centre half a ball has 83/320 m r², and its centre is 3/8 r off the flat face.
+    across += ball * (83 / 320 * radius**2 + (length / 2 + 3 / 8 * radius) ** 2)
+    return np.diag([across, across, rod * radius**2 / 2 + ball * 2 / 5 * radius**2])
 
 
 def hand_urdf(hand: Hand) -> str:
@@ -85,17 +114,17 @@ def hand_urdf(hand: Hand) -> str:
     robot = ElementTree.Element("robot", name="hand")
     palm = _element(robot, "link", name="palm")
     mass = hand.density * np.pi * hand.palm_radius**2 * hand.palm_thickness
-    _inertial(palm, mass, [0, 0, -hand.palm_thickness / 2], 1e-3 * mass * np.eye(3))
-    collision = _element(palm, "collision")
-    _element(collision, "origin", xyz=[0, 0, -hand.palm_thickness / 2])
-    _element(_element(collision, "geometry"), "cylinder", radius=hand.palm_radius, length=hand.palm_thickness)
+    middle, size = [0.0, 0.0, -hand.palm_thickness / 2], {"radius": hand.palm_radius, "length": hand.palm_thickness}
+    _inertial(palm, mass, middle, _disc_inertia(mass, hand.palm_radius, hand.palm_thickness))
+    for role in ("visual", "collision"):
+        _shape(palm, role, "cylinder", middle, [0.0, 0.0, 0.0], **size)
     for i, finger in enumerate(hand.fingers):
         parent, origin = "palm", np.asarray(finger.base)
         for j, segment in enumerate(finger.links):
             name = f"finger{i}_link{j}"
             link = _element(robot, "link", name=name)
             mass = hand.density * np.pi * segment.radius**2 * (segment.length + 4 / 3 * segment.radius)
-            _inertial(link, mass, [0, 0, segment.length / 2], 1e-4 * mass * np.eye(3))
+            _inertial(link, mass, [0, 0, segment.length / 2], _capsule_inertia(mass, segment.radius, segment.length))
             _capsule(link, [0, 0, 0], [0, 0, segment.length], segment.radius)
             joint = _element(robot, "joint", name=f"finger{i}_joint{j}", type="revolute")
             _element(joint, "parent", link=parent)
@@ -118,7 +147,7 @@ def object_urdf(task: Task) -> str:
     return ElementTree.tostring(robot, encoding="unicode")
 
 
-def result(task: Task, hand: Hand) -> dict[str, Any]:
+def result(task: Task, hand: Hand, samples: int) -> dict[str, Any]:
     """Return the part of result.json that the audit reads."""
     fingers = [
         {
@@ -139,17 +168,52 @@ def result(task: Task, hand: Hand) -> dict[str, Any]:
     return {
         "format": 1,
         "status": "feasible",
-        "object": {"mass": task.object.mass, "inertia": np.asarray(task.object.inertia).tolist()},
+        "task": task.name,
+        "task_hash": hashlib.sha256(task_to_yaml(task).encode()).hexdigest(),
+        "object": {
+            "mass": task.object.mass,
+            "inertia": np.asarray(task.object.inertia).tolist(),
+            "shapes": [_stated_shape(shape) for shape in task.object.shapes],
+        },
         "friction": task.friction,
         "gravity": list(task.gravity),
+        "ground_height": task.ground.height if task.ground else None,
+        "ground_friction": task.ground.friction if task.ground else None,
         "goals": goals,
-        "hand": {"palm": {"radius": hand.palm_radius, "thickness": hand.palm_thickness}, "fingers": fingers},
+        "hand": {
+            "palm": {"radius": hand.palm_radius, "thickness": hand.palm_thickness},
+            "fingers": fingers,
+            "joint_lower": hand.joint_lower,
+            "joint_upper": hand.joint_upper,
+            "effort": hand.effort,
+            "velocity": hand.velocity,
+            "density": hand.density,
+        },
+        "degrees_of_freedom": hand.degrees_of_freedom,
+        "samples": samples,
     }
 
 
+def _stated_shape(shape: Any) -> dict[str, Any]:
+    start, end = (point.tolist() for point in shape.segment)
+    if start == end:
+        return {"type": "sphere", "center": start, "radius": shape.radius}
+    return {"type": "capsule", "start": start, "end": end, "radius": shape.radius}
+
+
 MASS, RADIUS, TIP = 0.1, 0.02, 0.006
+STAND = 1.05 * TIP
+"""m of a finger's first joint above the palm's face."""
 CONTACTS = np.array([[RADIUS, 0.0, 0.004], *([-RADIUS / 2, s * RADIUS * np.sqrt(3) / 2, -0.002] for s in (1, -1))])
 """(3, 3) contact points on a capsule's side, 120 degrees apart, object frame."""
+
+
+def _skew(v: np.ndarray) -> np.ndarray:
+    return np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+
+
+GRASP = np.vstack([np.hstack([np.eye(3)] * 3), np.hstack([_skew(point) for point in CONTACTS])])
+"""(6, 9) contact forces to force and torque on the object, its frame."""
 
 _TASK = """
 name: carried
@@ -165,23 +229,23 @@ limits: {{unsupplied_force: 10}}
 """
 
 
-def carried(directory: Path) -> Scene:
+def carried(directory: Path, more: str = "") -> Scene:
     """Three fingers of two joints, held stiff, and a capsule between them; the palm carries all along a free curve.
 
     Forces are chosen first and SciPy integrates the capsule under them; the palm then follows it rigidly. So physics
-    holds to the integrator's 1e-12, nothing slips, and the contact points stay where they are.
+    holds to the integrator's 1e-12, nothing slips, and the contact points stay where they are. It starts and ends at
+    rest. Where the task has perturbations, the least forces beside the plan's bear them.
+
+    Args:
+        directory: for the task's file.
+        more: sections of the task beside those of `_TASK`.
     """
-    time = np.linspace(0.0, 2.0, 21)
-    inertia = np.diag([4.6e-5, 4.6e-5, 1.8e-5])
-    draft = _TASK.format(*(c.tolist() for c in CONTACTS), goals=_goals([0, 2], [[0, 0, 0.28]] * 2, [[1, 0, 0, 0]] * 2))
+    time, ends = np.linspace(0.0, 2.0, 21), [[0, 0, 0.28]] * 2
+    draft = _TASK.format(*(c.tolist() for c in CONTACTS), goals=_goals([0, 2], ends, [[1, 0, 0, 0]] * 2))
     task = read_task(directory, draft)
-    inertia = np.asarray(task.object.inertia)
-    forces = _carrying_forces(time, task.object.mass, inertia)
-    position, quaternion = integrate(
-        time, forces, CONTACTS, task.object.mass, inertia, np.asarray(task.gravity), np.array([0, 0, 0.28])
-    )
+    forces, position, quaternion = _carrying(task)
     goals = _goals([0, 1, 2], position[[0, 10, 20]], quaternion[[0, 10, 20]])
-    task = read_task(directory, _TASK.format(*(c.tolist() for c in CONTACTS), goals=goals))
+    task = read_task(directory, _TASK.format(*(c.tolist() for c in CONTACTS), goals=goals) + more)
     hand, angles, points = _grasp(task)
     turn = Rotation.from_quat(quaternion, scalar_first=True)
     base = Rotation.from_matrix(task.palm.rotation)
@@ -203,7 +267,27 @@ def carried(directory: Path) -> Scene:
         external_force=np.zeros((samples, 3)),
         external_torque=np.zeros((samples, 3)),
     )
-    return Scene(task, hand, motion)
+    return Scene(task, hand, _disturbed(task, motion, turn) if task.perturbations else motion)
+
+
+def _disturbed(task: Task, motion: Motion, turn: Rotation) -> Motion:
+    """Return the motion with its second scenario; perturbations must begin and end between samples, or at none."""
+    force, torque = np.zeros((len(motion.time), 3)), np.zeros((len(motion.time), 3))
+    for push in task.perturbations:
+        acts = (motion.time > push.start) & (motion.time < push.end)
+        if not acts.any():
+            acts[np.argmin(np.abs(motion.time - (push.start + push.end) / 2))] = True
+        force[acts] += push.force
+        torque[acts] += push.torque
+    wrench = np.hstack([turn.apply(force, inverse=True), turn.apply(torque, inverse=True)])
+    more = np.linalg.lstsq(GRASP, -wrench.T, rcond=None)[0].T.reshape(-1, 3, 3)
+    more = np.array([turn[k].apply(row) for k, row in enumerate(more)])
+    return replace(
+        motion,
+        contact_force_disturbed=motion.contact_force + more,
+        external_force_disturbed=force,
+        external_torque_disturbed=torque,
+    )
 
 
 def _goals(times: Any, positions: Any, quaternions: Any) -> str:
@@ -214,12 +298,44 @@ def _goals(times: Any, positions: Any, quaternions: Any) -> str:
     return "\n".join(lines)
 
 
-def _carrying_forces(time: np.ndarray, mass: float, inertia: np.ndarray) -> np.ndarray:
+def _carrying(task: Task) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return contact forces (S, 3, 3) in the object's frame, and positions and orientations that follow from them.
+
+    A squeeze, what a planned motion needs roughly, and a little more in the middle, by which it ends at rest.
+    """
+    known = task.object.model_dump_json(), task.gravity
+    if known not in _carryings:
+        time, inertia = np.linspace(0.0, 2.0, 21), np.asarray(task.object.inertia)
+        rough = _rough_forces(time, task.object.mass, inertia)
+        body = CONTACTS, task.object.mass, inertia, np.asarray(task.gravity), np.array([0, 0, 0.28])
+
+        def carry(wrench: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            more = np.outer(np.sin(np.pi * time / time[-1]), np.linalg.pinv(GRASP) @ wrench).reshape(-1, 3, 3)
+            return rough + more, _integrated(time, rough + more, *body)
+
+        def speeds(wrench: np.ndarray) -> np.ndarray:
+            last = carry(wrench)[1][-1]
+            return np.concatenate([last[3:6], last[15:]])
+
+        wrench, ends = np.zeros(6), speeds(np.zeros(6))
+        steps = 1e-3 * np.array([*[1.0] * 3, *[0.01] * 3])
+        slope = np.column_stack([(speeds(step) - ends) / step.sum() for step in np.diag(steps)])
+        while np.abs(ends).max() > 1e-10:
+            wrench = wrench - np.linalg.solve(slope, ends)
+            ends = speeds(wrench)
+        forces, states = carry(wrench)
+        _carryings[known] = forces, states[:, :3], _quaternions(states)
+    return _carryings[known]
+
+
+_carryings: dict[Any, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
+
+
+def _rough_forces(time: np.ndarray, mass: float, inertia: np.ndarray) -> np.ndarray:
     """Return (S, 3, 3) contact forces in the object's frame: a squeeze, and what a planned motion needs roughly."""
-    grasp = np.vstack([np.hstack([np.eye(3)] * 3), np.hstack([_skew(point) for point in CONTACTS])])
     axis = np.array([1.0, 2.0, 0.5]) / np.linalg.norm([1.0, 2.0, 0.5])
     inward = (-1.5 * np.array([[p[0], p[1], 0.0] for p in CONTACTS]) / RADIUS).ravel()
-    squeeze = inward - np.linalg.lstsq(grasp, grasp @ inward, rcond=None)[0]
+    squeeze = inward - np.linalg.lstsq(GRASP, GRASP @ inward, rcond=None)[0]
     forces = []
     for t in time:
         angle, spin_up = 0.25 * (1 - np.cos(np.pi * t)), 0.25 * np.pi**2 * np.cos(np.pi * t)
@@ -227,12 +343,8 @@ def _carrying_forces(time: np.ndarray, mass: float, inertia: np.ndarray) -> np.n
         turn = Rotation.from_rotvec(angle * axis)
         force = turn.apply(mass * (acceleration + np.array([0, 0, 9.81])), inverse=True)
         wrench = np.concatenate([force, inertia @ axis * spin_up])
-        forces.append(np.linalg.lstsq(grasp, wrench, rcond=None)[0] + squeeze)
+        forces.append(np.linalg.lstsq(GRASP, wrench, rcond=None)[0] + squeeze)
     return np.array(forces).reshape(-1, 3, 3)
-
-
-def _skew(v: np.ndarray) -> np.ndarray:
-    return np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
 
 
 def integrate(
@@ -250,8 +362,26 @@ def integrate(
     Returns:
         positions (S, 3) and orientations (S, 4) [w, x, y, z] ; it starts upright, at rest but for ``rate``.
     """
-    state = np.concatenate([start, np.zeros(3), np.eye(3).ravel(), rate])
-    positions, turns = [state[:3]], [np.eye(3)]
+    states = _integrated(time, forces, points, mass, inertia, gravity, start, rate)
+    return states[:, :3], _quaternions(states)
+
+
+def _quaternions(states: np.ndarray) -> np.ndarray:
+    return Rotation.from_matrix(states[:, 6:15].reshape(-1, 3, 3)).as_quat(scalar_first=True)
+
+
+def _integrated(
+    time: np.ndarray,
+    forces: np.ndarray,
+    points: np.ndarray,
+    mass: float,
+    inertia: np.ndarray,
+    gravity: np.ndarray,
+    start: np.ndarray,
+    rate: Any = (0.0, 0.0, 0.0),
+) -> np.ndarray:
+    """Return states (S, 18): position, velocity, rotation matrix, rate in the body's frame."""
+    states = [np.concatenate([start, np.zeros(3), np.eye(3).ravel(), rate])]
     for k in range(len(time) - 1):
 
         def slope(t: float, y: np.ndarray, k: int = k) -> np.ndarray:
@@ -263,11 +393,9 @@ def integrate(
             spin = np.linalg.solve(inertia, torque - np.cross(omega, inertia @ omega))
             return np.concatenate([y[3:6], acceleration, (turn @ _skew(omega)).ravel(), spin])
 
-        solution = solve_ivp(slope, time[k : k + 2], state, method="DOP853", rtol=1e-13, atol=1e-15)
-        state = solution.y[:, -1]
-        positions.append(state[:3])
-        turns.append(state[6:15].reshape(3, 3))
-    return np.array(positions), Rotation.from_matrix(np.array(turns)).as_quat(scalar_first=True)
+        solution = solve_ivp(slope, time[k : k + 2], states[-1], method="DOP853", rtol=1e-13, atol=1e-15)
+        states.append(solution.y[:, -1])
+    return np.array(states)
 
 
 def _grasp(task: Task) -> tuple[Hand, np.ndarray, np.ndarray]:
@@ -282,8 +410,8 @@ def _grasp(task: Task) -> tuple[Hand, np.ndarray, np.ndarray]:
         radial = to_palm.apply([contact[0], contact[1], 0.0]) / RADIUS
         tip = to_palm.apply(contact) + [0, 0, 0.08] + TIP * radial
         outer, inner = _lean(radial, out_angle), _lean(radial, in_angle)
-        # Both lengths follow from where the tip is once the base is 38 mm from the palm's centre.
-        base = 0.038 * radial
+        # Both lengths follow from where the tip is once the base is 38 mm from the palm's centre, on its face.
+        base = 0.038 * radial + [0.0, 0.0, STAND]
         lengths = np.linalg.lstsq(np.column_stack([outer, inner]), tip - base, rcond=None)[0]
         axis = tuple(np.cross([0, 0, 1], radial).tolist())
         links = tuple(Link(float(length), TIP, axis) for length in lengths)
@@ -308,7 +436,7 @@ def plain(task: Task, time: np.ndarray, links: int = 1, **arrays: Any) -> Scene:
     fingers = []
     for i, name in enumerate(task.fingers):
         turn = 2 * np.pi * i / len(task.fingers)
-        base = (0.8 * task.palm.radius * np.cos(turn), 0.8 * task.palm.radius * np.sin(turn), 0.0)
+        base = (0.8 * task.palm.radius * np.cos(turn), 0.8 * task.palm.radius * np.sin(turn), STAND)
         fingers.append(Finger(name, base, (Link(0.04, TIP, (0.0, 1.0, 0.0)),) * links))
     limit, samples, contacts = float(np.deg2rad(150.0)), len(time), len(fingers)
     hand = Hand(task.palm.radius, task.palm.thickness, tuple(fingers), -limit, limit, 1.0, 5.0, task.hand.density)

@@ -122,4 +122,5 @@ def test_a_film_shows_the_whole_replay_and_something_that_moves(folder: Path, mo
     # Half a second to settle and the two seconds of the motion.
     assert len(frames) == pytest.approx(2.5 * FRAMES, abs=2)
     assert all(frame.shape == (*SIZE, 3) for frame in frames)
-    assert np.abs(frames[0].astype(int) - frames[-1]).mean() > 0.5
+    # The motion ends where it began.
+    assert np.abs(frames[0].astype(int) - frames[len(frames) // 2]).mean() > 0.5
