@@ -34,8 +34,8 @@ from casadi_hands.stages.refine import (
 from casadi_hands.stages.refine_values import TOOL_TOLERANCE, Margin, RefineValues, longest_run
 from casadi_hands.stages.whole_hand import WholeHand
 from casadi_hands.task import Task, load_task
-from casadi_hands.verify import Audit, audit
-from tests.stages.example import made_up_solution, project
+from casadi_hands.verify import Audit, audit_files
+from tests.stages.example import STAND, made_up_solution, project
 from tests.stages.refining import MadeUp, carrying, sketching
 from tests.stages.searched import whole_hand_of_two_joints
 
@@ -308,7 +308,7 @@ def solved(tmp_path_factory: pytest.TempPathFactory) -> Solved:
     design = Design(task=task, status="feasible", hand=built, motion=whole_hand_motion(model, result))
     folder = tmp_path_factory.mktemp("refined")
     design.save(folder)
-    return Solved(task, model, whole, refined, design, audit(folder))
+    return Solved(task, model, whole, refined, design, audit_files(folder))
 
 
 def test_the_result_is_exact_and_the_audit_certifies_it(solved: Solved) -> None:
@@ -367,6 +367,7 @@ def test_what_moved_is_told(solved: Solved) -> None:
     for built, finger in zip(hand.fingers, solved.refined.hand.fingers, strict=True):
         np.testing.assert_allclose([link.length for link in built.links], finger.lengths * length, rtol=1e-12)
         assert np.hypot(*built.base[:2]) <= solved.task.palm.radius
+        assert built.base[2] == pytest.approx(STAND * solved.task.hand.link_radius, rel=1e-12)
 
 
 def test_one_joint_cannot_roll_with_the_object_and_no_exact_solve_is_tried(solved: Solved) -> None:
