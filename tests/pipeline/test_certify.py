@@ -151,7 +151,7 @@ def test_a_design_there_is_already_is_better_than_a_hand_far_from_its_contacts(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     loop = Loop(monkeypatch, [], max_joints=3)
-    known = replace(loop.record.design, status="certified", reason="known")
+    known = replayed(replace(loop.record.design, status="certified", reason="known"), 0)
     loop.record.offer(known)
     assert loop.run(found((1, 1), farthest=0.31)).reason == "known"
 

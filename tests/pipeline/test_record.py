@@ -84,6 +84,15 @@ def test_nothing_unfinished_takes_the_place_of_a_judged_design(tmp_path: Path) -
     assert (loaded.status, loaded.reason) == ("feasible", "slips a little")
 
 
+def test_what_was_not_replayed_is_not_called_certified(tmp_path: Path) -> None:
+    kept = record([], tmp_path)
+    kept.offer(replace(kept.design, status="certified", reason=""))
+    loaded = Design.load(tmp_path)
+    assert (loaded.status, loaded.reason) == ("feasible", "its files hold; it was stopped before it was replayed")
+    kept.offer(replayed(replace(kept.design, status="certified", reason=""), 1))
+    assert Design.load(tmp_path).status == "certified"
+
+
 def test_the_best_design_is_written_as_soon_as_it_is_known(tmp_path: Path) -> None:
     kept = record([], tmp_path)
 
