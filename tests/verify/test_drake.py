@@ -23,6 +23,7 @@ from casadi_hands.export.urdf import hand_urdf
 from casadi_hands.task import Ground
 from casadi_hands.verify import Perturbation, replay
 from casadi_hands.verify.drake import DrakeSimulation, load_drake
+from casadi_hands.verify.drake_scene import PATCH, PRESS
 from casadi_hands.verify.folder import Folder, read_folder
 from casadi_hands.verify.simulation import Plan
 
@@ -48,6 +49,11 @@ def _away(folder: Folder, **changes: Any) -> DrakeSimulation:
     return DrakeSimulation(folder, Perturbation(start_shift=(1.0, 0.0, 0.0), **changes))
 
 
+def _triple(vector: Any) -> tuple[float, float, float]:
+    x, y, z = np.asarray(vector).tolist()
+    return x, y, z
+
+
 def _lying(folder: Folder, **changes: Any) -> DrakeSimulation:
     """Return the scene with the object lying on the ground, along y."""
     start = folder.motion.object_position[0]
@@ -56,7 +62,7 @@ def _lying(folder: Folder, **changes: Any) -> DrakeSimulation:
     )
     shift = np.array([1.0, 0.0, FLOOR + RADIUS]) - start
     scene = DrakeSimulation(
-        folder, Perturbation(start_shift=tuple(shift), start_turn=tuple(turn.as_rotvec()), **changes)
+        folder, Perturbation(start_shift=_triple(shift), start_turn=_triple(turn.as_rotvec()), **changes)
     )
     _still(folder, scene, 0.3)
     return scene
@@ -213,6 +219,28 @@ def test_object_slides_on_the_ground_by_what_friction_leaves(folder: Folder, fac
     speeds = np.diff(path) / scene.step
     gained = (speeds[-1] - speeds[-51]) / (50 * scene.step)
     assert gained == pytest.approx((push - factor * GROUND_FRICTION * WEIGHT) / MASS, rel=0.02)
+
+
+@pytest.mark.parametrize("share", [0.7, 1.5])
+def test_a_patch_resists_twisting_by_its_radius(folder: Folder, share: float) -> None:
+    """Pressed onto the ground, the capsule's round end stands on a patch whose radius closed form gives."""
+    press = PRESS * WEIGHT
+    tip = max(shape.radius for name, link in folder.links.items() if name != "palm" for shape in link.capsules)
+    # The ground is rigid: of the object alone, the pressure rises twice as fast as between object and fingertip.
+    relative, patch = tip * RADIUS / (tip + RADIUS), PATCH * tip
+    gradient = 2 * press / (np.pi * relative * (patch**2 / (2 * relative)) ** 2)
+    depth = np.sqrt(press / (np.pi * gradient * RADIUS))
+    holds = 8 / 15 * GROUND_FRICTION * press * np.sqrt(2 * RADIUS * depth)
+    upright = (1.0, 0.0, FLOOR + 0.05 - depth)
+    start, now = folder.motion.object_position[0], folder.motion.object_orientation[0]
+    turn = Rotation.from_quat(now, scalar_first=True).inv().as_rotvec()
+    scene = DrakeSimulation(folder, Perturbation(start_shift=_triple(upright - start), start_turn=_triple(turn)))
+    steps = round(0.1 / scene.step)
+    torque = np.tile([0.0, 0.0, share * holds], (steps + 1, 1))
+    _still(folder, scene, 0.1, [0.0, 0.0, WEIGHT - press], external_torque=torque)
+    spun = Rotation.from_quat(scene.object_pose()[1], scalar_first=True).as_rotvec()[2]
+    # By closed form it turns by 0.34 rad where the torque is half as large again; the patch is a polygon.
+    assert abs(spun) < 5e-3 if share < 1.0 else spun > 0.1
 
 
 def test_coefficients_of_hand_and_ground_are_the_tasks(folder: Folder) -> None:
