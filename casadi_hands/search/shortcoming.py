@@ -19,6 +19,7 @@ WITHOUT_FORCE = frozenset(
     (
         "residual",
         "residual_between",
+        "rest",
         "friction_excess",
         "pull",
         "gap_between",
@@ -27,7 +28,8 @@ WITHOUT_FORCE = frozenset(
         "disturbance_radius",
     )
 )
-WITHOUT_CONTACT = WITHOUT_FORCE | {"gap", "penetration", "joint_limit"}
+# Stretched out for its contact a finger may well leave its joints' limits and, which is of the structure, the palm.
+WITHOUT_CONTACT = WITHOUT_FORCE | {"gap", "penetration", "joint_limit", "structure"}
 
 
 def beyond_reach(target: Target, contact: int, joints: int) -> Array:
