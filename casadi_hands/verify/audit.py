@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from casadi_hands.task import load_task
+from casadi_hands.verify.certificate import certificate_problems
 from casadi_hands.verify.clearance import joint_figures, penetration_figure
 from casadi_hands.verify.contact import (
     friction_figures,
@@ -46,11 +47,21 @@ def audit(directory: str | Path, *, task: str | Path | None = None, replays: int
         TaskError: ``task.yaml`` is not a task.
         HandsError: MuJoCo cannot be loaded.
     """
-    found = audit_files(directory, task)
+    found = _with_certificate(directory, audit_files(directory, task), task is None)
     if not replays or not found.certified:
         return found
     figures = run_replays(directory, replays, jobs=jobs).figures(None if task is None else load_task(task))
     return replace(found, figures={**found.figures, **{figure.name: figure for figure in figures}})
+
+
+def _with_certificate(directory: str | Path, found: Audit, limits: bool) -> Audit:
+    """Return the audit with what is wrong with the certificate that ``result.json`` states."""
+    wrong = certificate_problems(directory, {n: f for n, f in found.figures.items() if n != "structure"}, limits)
+    if not wrong:
+        return found
+    problems = (*found.problems, *wrong)
+    structure = replace(found.figures["structure"], value=float(len(problems)))
+    return replace(found, figures={**found.figures, "structure": structure}, problems=problems)
 
 
 def audit_files(directory: str | Path, task: str | Path | None = None) -> Audit:

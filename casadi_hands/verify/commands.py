@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from casadi_hands.verify.folder import Folder
-from casadi_hands.verify.trajectory import DENSITY, Trajectory
+from casadi_hands.verify.trajectory import joint_velocities
 from casadi_hands.verify.wrench import planned_torques
 
 EXACT = 1e-6
 """Share of the largest by which a stated value may differ."""
 
 
-def command_problems(folder: Folder, path: Trajectory) -> list[str]:
+def command_problems(folder: Folder) -> list[str]:
     """Return where velocities, torques or commands are not what the rest of the files says, a sentence each."""
     motion = folder.motion
-    velocities, torques = path.speeds[::DENSITY], planned_torques(folder)
+    velocities, torques = joint_velocities(folder), planned_torques(folder)
     problems = [
         *_unlike(folder, "joint_velocities", velocities, "rad/s", "the motion turns it"),
         *_unlike(folder, "joint_torques", torques, "N·m", "the contact forces need"),

@@ -58,7 +58,8 @@ def _different(folder: Folder, force: np.ndarray, torque: np.ndarray, name: str,
         off = np.array([_off(values[k], due[k], each[near[:, k]]) for k in range(len(time))])
         if off.max() <= 1e-9 * scale:
             continue
-        k = int(np.argmax(off))
+        acting = off * np.any(values != 0.0, axis=1)  # what helps is worse than what is missing
+        k = int(np.argmax(acting if acting.max() > 1e-9 * scale else off))
         what = f"{name}_{kind}{suffix}: at {time[k]:.3g} s it is {_words(values[k])} {unit}"
         if np.any(due[k]):
             problems.append(f"{what}; the task's perturbations state {_words(due[k])} {unit}")

@@ -114,6 +114,13 @@ def _read_joint(path: Path, name: str, element: Element) -> Joint:
     assert child is not None
     assert axis is not None
     assert limit is not None
+    able = {word: number(path, limit, word) for word in ("effort", "velocity")}
+    for word, value in able.items():
+        if value <= 0.0:
+            raise DesignError(f"{path}: joint {name}: its {word} limit is {value:g}, not above zero")
+    lower, upper = number(path, limit, "lower"), number(path, limit, "upper")
+    if lower > upper:
+        raise DesignError(f"{path}: joint {name}: its lower limit, {lower:g}, is above its upper, {upper:g}")
     zero = Element("origin")
     return Joint(
         name,
@@ -122,10 +129,10 @@ def _read_joint(path: Path, name: str, element: Element) -> Joint:
         numbers(path, zero if origin is None else origin, "xyz", 3, "0 0 0"),
         numbers(path, zero if origin is None else origin, "rpy", 3, "0 0 0"),
         numbers(path, axis, "xyz", 3, "1 0 0"),
-        number(path, limit, "lower"),
-        number(path, limit, "upper"),
-        number(path, limit, "effort"),
-        number(path, limit, "velocity"),
+        lower,
+        upper,
+        able["effort"],
+        able["velocity"],
     )
 
 

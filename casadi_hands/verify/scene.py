@@ -48,9 +48,8 @@ def _world_problems(folder: Folder, scene: Scene) -> list[str]:
     if not np.allclose(scene.gravity, folder.gravity, atol=1e-9, rtol=EXACT):
         problems.append(f"gravity is {scene.gravity.tolist()}, in task.yaml {folder.gravity.tolist()}")
     if len(scene.planes) != (0 if ground is None else 1) or any(plane.kind != "plane" for plane in scene.planes):
-        problems.append(
-            f"has {len(scene.planes)} solids beside hand and object; the task has {int(ground is not None)} ground"
-        )
+        due = "no ground" if ground is None else "a ground"
+        problems.append(f"has {len(scene.planes)} solids beside hand and object; the task has {due}")
     elif ground is not None:
         plane = scene.planes[0]
         if abs(plane.start[2] - ground.height) > EXACT * folder.length:

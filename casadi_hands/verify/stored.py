@@ -179,7 +179,7 @@ def same(one: Any, other: Any, tolerance: float = 1e-6) -> bool:
     if one is None or other is None:
         return False
     b = np.asarray(other, dtype=float)
-    a = as_array(one, b.shape) if isinstance(one, list | int | float) else np.asarray(one, dtype=float)
+    a = np.asarray(one, dtype=float) if isinstance(one, np.ndarray | np.generic) else as_array(one, b.shape)
     if a is None or a.shape != b.shape:
         return False
     return bool(np.all(np.abs(a - b) <= tolerance * max(np.max(np.abs(b), initial=0.0), 1e-12)))

@@ -10,6 +10,7 @@ from casadi_hands.verify.folder import Folder
 from casadi_hands.verify.motion import motion_problems
 from casadi_hands.verify.palm import palm_problems
 from casadi_hands.verify.scene import scene_problems
+from casadi_hands.verify.table import table_problems
 from casadi_hands.verify.trajectory import Trajectory
 from casadi_hands.verify.trust import task_problems
 
@@ -32,8 +33,9 @@ def structure_problems(folder: Folder, path: Trajectory) -> list[str]:
         *hand_task_problems(folder, path),
         *palm_problems(folder),
         *record_problems(folder),
-        *command_problems(folder, path),
+        *command_problems(folder),
         *scene_problems(folder),
+        *table_problems(folder),
     ]
 
 

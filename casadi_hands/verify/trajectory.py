@@ -64,6 +64,11 @@ def build_trajectory(folder: Folder, shots: Shots) -> Trajectory:
     return Trajectory(time, interval, joints, speeds, placed)
 
 
+def joint_velocities(folder: Folder) -> np.ndarray:
+    """Return the joints' velocities (S, J), rad/s, at the samples of a motion that starts and ends at rest."""
+    return _joints(folder, folder.motion.time, (True, True))[1]
+
+
 def sample_placements(folder: Folder) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Return body name -> rotations (S, 3, 3) and positions (S, 3) in the world at the samples."""
     motion = folder.motion

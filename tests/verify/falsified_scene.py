@@ -1,0 +1,96 @@
+"""Scenes that are not of the result."""
+
+from __future__ import annotations
+
+from falsify import (
+    BODY,
+    SCENE,
+    THING,
+    Cases,
+    added,
+    attribute,
+    edited,
+    hung,
+    removed,
+)
+
+IN_THE_SCENE: Cases = {
+    "no scene": (lambda folder: (folder / SCENE).unlink(), r"scene\.xml: missing"),
+    "gravity": (attribute(SCENE, "option", "gravity", "0 0 0"), r"scene\.xml: gravity is"),
+    "gravity switched off": (added(SCENE, "option", "<flag gravity='disable'/>"), r"<flag> in <option>"),
+    "thick air": (attribute(SCENE, "option", "viscosity", "10"), r"no attribute viscosity"),
+    "gravity further down": (added(SCENE, ".", "<option gravity='0 0 0'/>"), r"2 elements <option>"),
+    "degrees": (attribute(SCENE, "compiler", "angle", "degree"), r"angles are not in radians"),
+    "the ground's height": (attribute(SCENE, ".//geom[@name='ground']", "pos", "0 0 -5"), r"the ground is at -5 m"),
+    "the ground's friction": (
+        attribute(SCENE, ".//geom[@name='ground']", "friction", "5 0 0"),
+        r"the ground's friction",
+    ),
+    "no ground": (removed(SCENE, "worldbody/geom"), r"has 0 solids beside hand and object; the task has a ground"),
+    "a wall": (
+        added(SCENE, "worldbody", "<geom name='wall' type='capsule' fromto='0 0 0 0 0 1' size='0.01'/>"),
+        r"has 2 solids beside hand and object",
+    ),
+    "the object's friction": (
+        attribute(SCENE, THING + "/geom", "friction", "5 0.00108 0"),
+        r"the friction of the object is 5",
+    ),
+    "a sticky fingertip": (attribute(SCENE, BODY + "/geom", "friction", "0.9 1 0"), r"resists turning or rolling"),
+    "the object's mass": (
+        attribute(SCENE, THING + "/inertial", "mass", "0.01"),
+        r"mass of the object is 0\.01 kg, in object\.urdf 0\.1",
+    ),
+    "the object's inertia": (
+        attribute(SCENE, THING + "/inertial", "fullinertia", "1 1 1 0 0 0"),
+        r"inertia or centre of mass of the object",
+    ),
+    "the object's size": (attribute(SCENE, THING + "/geom", "size", "0.03"), r"the solids of the object"),
+    "the object's place": (
+        attribute(SCENE, THING, "pos", "0 0 0.3"),
+        r"the object does not stand as at the motion's first",
+    ),
+    "the object hangs on the palm": (lambda folder: hung(folder), r"the object"),
+    "the object is held": (removed(SCENE, THING + "/freejoint"), r"the object is not free"),
+    "a link's size": (attribute(SCENE, BODY + "/geom", "size", "0.001"), r"solids of finger 'one' \(link 1\)"),
+    "a link that does not collide": (attribute(SCENE, BODY + "/geom", "contype", "0"), r"no attribute contype"),
+    "a link's place": (attribute(SCENE, BODY, "pos", "0 0 0"), r"finger 'one' \(link 1\) does not stand as"),
+    "a joint's axis": (attribute(SCENE, BODY + "/joint", "axis", "1 0 0"), r"joint finger0_joint1: its axis"),
+    "a joint's limits": (attribute(SCENE, BODY + "/joint", "range", "-9 9"), r"joint finger0_joint1: its limits"),
+    "a joint's reference": (attribute(SCENE, BODY + "/joint", "ref", "0"), r"its angle at the start"),
+    "a joint without limits": (attribute(SCENE, BODY + "/joint", "limited", "false"), r"has no limits"),
+    "a joint with a spring": (attribute(SCENE, BODY + "/joint", "stiffness", "9"), r"no attribute stiffness"),
+    "an extra body": (added(SCENE, "worldbody", "<body name='post'/>"), r"body post is in no other file"),
+    "a body twice": (added(SCENE, "worldbody", "<body name='object'/>"), r"two <body name=\"object\">"),
+    "bodies that pass through each other": (
+        added(SCENE, "contact", "<exclude body1='object' body2='palm'/>"),
+        r"the object and the palm do not collide, though they share no joint",
+    ),
+    "a weld of the object": (
+        added(SCENE, "equality", "<weld body1='palm' body2='object'/>"),
+        r"welds .*palm to object",
+    ),
+    "no weld of the palm": (removed(SCENE, "equality/weld"), r"welds nothing"),
+    "strong motors": (
+        edited(SCENE, ".//position", lambda e, p: e.set("forcerange", "-99 99"), every=True),
+        r"torque of joint finger0_joint0 is not limited to its effort",
+    ),
+    "stiff motors": (
+        edited(SCENE, ".//position", lambda e, p: e.set("kp", "1000"), every=True),
+        r"joint_commands: .* motors of scene\.xml need",
+    ),
+    "a motor less": (removed(SCENE, ".//position[@joint='finger2_joint1']"), r"its actuators turn"),
+    "a motor on the object": (added(SCENE, "actuator", "<motor joint='object'/>"), r"<motor> in <actuator>"),
+    "a tendon": (added(SCENE, ".", "<tendon/>"), r"<tendon> in <mujoco"),
+    "an included file": (added(SCENE, "worldbody", "<include file='x.xml'/>"), r"<include> in <worldbody>"),
+    "a default of no collisions": (attribute(SCENE, "default/geom", "conaffinity", "0"), r"no attribute conaffinity"),
+    "a keyframe's pose": (
+        attribute(SCENE, ".//key[@name='goal2']", "qpos", lambda v: "1 " + v.partition(" ")[2]),
+        r"keyframe goal2: qpos",
+    ),
+    "a keyframe's commands": (
+        attribute(SCENE, ".//key[@name='goal1']", "ctrl", lambda v: "1 " + v.partition(" ")[2]),
+        r"keyframe goal1: ctrl",
+    ),
+    "a keyframe's time": (attribute(SCENE, ".//key[@name='goal3']", "time", "9"), r"keyframe goal3: time"),
+    "a keyframe less": (removed(SCENE, ".//key[@name='goal3']"), r"has no keyframe goal3"),
+}

@@ -1,0 +1,180 @@
+"""One good result, falsified in many ways: the audit certifies none and names the thing each time."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from falsified_files import DISAGREEMENTS
+from falsified_hand import HAND_AGAINST_TASK, HIDDEN
+from falsified_motion import DISTURBANCES, NO_NUMBERS
+from falsified_scene import IN_THE_SCENE
+from falsify import (
+    DISTURBED,
+    HAND,
+    LINK,
+    SCENE,
+    Falsify,
+    added,
+    arrays,
+    edited,
+    removed,
+    task,
+    text,
+)
+from fixture import Scene, carried
+from scipy.spatial.transform import Rotation
+
+from casadi_hands.errors import DesignError, TaskError
+from casadi_hands.export.table import motion_table
+from casadi_hands.verify.audit import audit, audit_files
+from casadi_hands.verify.dynamics import shoot
+from casadi_hands.verify.folder import read_folder
+from casadi_hands.verify.structure import structure_problems
+from casadi_hands.verify.trajectory import build_trajectory
+
+MORE = """
+perturbations: [{from: 0.45, to: 0.85, force: [0.1, 0, -0.3]}, {from: 1.22, to: 1.28, torque: [0, 0, 0.002]}]
+ground: {height: 0, touches: [0, 0, -0.05]}
+"""
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    return carried(tmp_path_factory.mktemp("task"), MORE)
+
+
+@pytest.fixture(scope="module")
+def good(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = scene.write(tmp_path_factory.mktemp("good"))
+    (folder / "motion.csv").write_text(motion_table(read_folder(folder).motion))
+    return folder
+
+
+@pytest.fixture
+def bad(good: Path, tmp_path: Path) -> Path:
+    return shutil.copytree(good, tmp_path / "bad")
+
+
+def _refusal(folder: Path) -> str:
+    """What the audit says against a folder, in lines; empty when it certifies it."""
+    try:
+        # What is wrong with the files is found faster than all figures are computed, and is enough.
+        read = read_folder(folder)
+        problems = structure_problems(read, build_trajectory(read, shoot(read)))
+        return "\n".join(problems or audit_files(folder).reasons)
+    except (DesignError, TaskError) as error:
+        return str(error)
+
+
+def test_the_good_result_is_certified(good: Path) -> None:
+    assert audit(good, replays=0).reasons == []
+
+
+CASES = {
+    f"{kind}: {name}": case
+    for kind, cases in {
+        "disturbances": DISTURBANCES,
+        "hand against task": HAND_AGAINST_TASK,
+        "hidden": HIDDEN,
+        "no numbers": NO_NUMBERS,
+        "disagreement": DISAGREEMENTS,
+        "scene": IN_THE_SCENE,
+    }.items()
+    for name, case in cases.items()
+}
+
+
+def test_there_are_many() -> None:
+    assert len(CASES) >= 120
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_falsified_results_are_refused_and_the_thing_is_named(bad: Path, name: str) -> None:
+    falsify, named = CASES[name]
+    falsify(bad)
+    said = _refusal(bad)
+    if name == "disagreement: a later certificate":
+        said = "\n".join(audit(bad, replays=0).reasons)
+    assert said, "certified"
+    assert re.search(named, said), said
+
+
+@pytest.mark.parametrize("gravity", [(0.0, 0.0, -9.81), (0.0, 0.0, 0.0)])
+@pytest.mark.parametrize("start", ["thrown", "spun"])
+def test_an_object_that_no_hand_touches_is_not_certified(
+    scene: Scene, tmp_path: Path, gravity: tuple[float, float, float], start: str
+) -> None:
+    """Where it falls from, it comes back to, or turns once, all by itself and exactly."""
+    time = scene.motion.time
+    rise = np.outer(time * (time[-1] - time), [0, 0, 0.5 * 9.81]) if any(gravity) else np.outer(time, [0, 0, 0.1])
+    turn = Rotation.from_rotvec(np.outer(time, [0, 0, np.pi if start == "spun" else 0.0]))
+    where, still = np.array([0.3, 0, 0.28]) + rise, np.array([0.0, 0.0, 0.2])
+    goals = (
+        scene.task.motion[0].model_copy(update={"position": tuple(where[0].tolist())}),
+        scene.task.motion[2].model_copy(update={"position": tuple(where[-1].tolist())}),
+    )
+    task = scene.task.model_copy(update={"motion": goals, "gravity": gravity, "perturbations": ()})
+    motion = replace(
+        scene.motion,
+        object_position=where,
+        object_orientation=turn.as_quat(scalar_first=True),
+        base_position=np.tile(still, (len(time), 1)),
+        base_orientation=np.tile(scene.motion.base_orientation[0], (len(time), 1)),
+        contact_active=np.zeros_like(scene.motion.contact_active),
+        contact_force=np.zeros_like(scene.motion.contact_force),
+        **dict.fromkeys(DISTURBED),
+    )
+    found = audit_files(replace(scene, task=task, motion=motion).write(tmp_path))
+    assert [name for name, figure in found.figures.items() if not figure.holds] == ["rest"]
+    assert re.search(r"the object (starts|ends) with .*; a motion starts and ends at rest", found.reasons[0])
+
+
+@pytest.mark.parametrize(
+    "vary",
+    [
+        edited(HAND, LINK, lambda e, p: e.insert(0, ElementTree.Comment("the proximal one"))),
+        edited(HAND, ".//limit", lambda e, p: reversed(e), every=True),
+        edited(SCENE, ".//geom", lambda e, p: reversed(e), every=True),
+        edited(HAND, ".", lambda e, p: e.__setitem__(slice(None), sorted(e, key=lambda child: child.tag))),
+        edited(SCENE, "worldbody//geom", lambda e, p: e.set("rgba", "1 0 0 1"), every=True),
+        added(SCENE, "worldbody", "<camera name='above' pos='0 0 1'/>"),
+        removed(SCENE, "statistic"),
+        text("result.json", "{", '{"comment": "an entry more", ', 1),
+        arrays(more=np.arange(3)),
+        lambda folder: (folder / "motion.csv").unlink(),
+        lambda folder: (folder / "notes.txt").write_text("of the reader"),
+        task("actuator: {torque: 0.5, speed: 5.0}\n", ""),
+    ],
+)
+def test_what_says_the_same_stays_certified(bad: Path, vary: Falsify) -> None:
+    vary(bad)
+    assert _refusal(bad) == ""
+
+
+def test_a_trusted_task_judges_and_says_what_the_folder_says_otherwise(good: Path, bad: Path, tmp_path: Path) -> None:
+    trusted = tmp_path / "trusted.yaml"
+    shutil.copy(good / "task.yaml", trusted)
+    assert audit(bad, task=trusted, replays=0).reasons == []
+    task("  slip: 0.0002", "  slip: 0.005")(bad)
+    found = audit(bad, task=trusted, replays=0)
+    assert found.certified
+    assert "limits.slip: 5 mm in the folder's task, 0.2 mm by default (looser)" in found.notes
+    assert f"limits.slip: 5 mm in the folder's task, 0.2 mm in {trusted}, which is what counts" in found.notes
+    assert found.figures["slip"].limit == 0.0002
+    assert "limits.slip: 5 mm in the folder's task, 0.2 mm by default (looser)" in audit(bad, replays=0).notes
+    task("density: 1150.0", "density: 1000.0")(bad)
+    found = audit(bad, task=trusted, replays=0)
+    assert f"task.yaml is not {trusted}: hand.density (1000.0, there 1150.0)" in found.problems
+
+
+def test_a_trusted_task_is_the_users_own_words(good: Path, scene: Scene, tmp_path: Path) -> None:
+    short = tmp_path / "short.yaml"
+    lines = (good / "task.yaml").read_text().split("weights:")[0].splitlines()
+    short.write_text("\n".join(line for line in lines if not line.startswith(("about", "duration", "time_step"))))
+    assert audit(good, task=short, replays=0).problems == ()
