@@ -17,7 +17,7 @@ from casadi_hands.stages.outcome import hand_of, whole_hand_motion
 from casadi_hands.stages.refine_values import Margin
 from casadi_hands.stages.whole_hand import WholeHand
 from casadi_hands.task import Task, parse_task
-from tests.export.example import BASES, LENGTHS, TASK, example_hand, example_motion
+from tests.export.example import BASES, HEIGHT, LENGTHS, TASK, example_hand, example_motion
 
 # One keyframe between goals puts the samples where the motion's are.
 HELD = TASK.replace("ground: {height: 0.2, friction: 0.8}\n", "keyframes_between: 1\nhand: {link_radius: 0.008}\n")
@@ -134,6 +134,29 @@ def on_finger(angles: np.ndarray, on_link: np.ndarray) -> np.ndarray:
     first, last = (Rotation.from_rotvec(np.outer(a, [1, 0, 0])) for a in (angles[:, 0], angles.sum(axis=1)))
     reached: np.ndarray = first.apply([0, 0, LENGTHS[0]]) + last.apply(on_link)
     return reached
+
+
+def test_fingers_of_an_earlier_version_stand_up_and_their_contacts_stay() -> None:
+    # Their first joints were in the palm's face. With all as much nearer, this motion is one of the same angles.
+    changes = [f"position: [{x}, 0, 0.3] -> position: [{x - HEIGHT:.4f}, 0, 0.3]" for x in (0.075, 0.115)]
+    hand, motion = example_hand(), example_motion()
+    flat = replace(hand, fingers=tuple(replace(f, base=(*f.base[:2], 0.0)) for f in hand.fingers))
+    nearer = replace(motion, object_position=motion.object_position - [HEIGHT, 0, 0])
+    task, start, found = start_for(
+        edited(*changes), Design(parse_task(edited(*changes)), "feasible", hand=flat, motion=nearer)
+    )
+    for name in ("object_position", "contact_force", "contact_point_object"):
+        np.testing.assert_allclose(getattr(found, name), getattr(nearer, name), atol=1e-9)
+    built = hand_of(task, build_model(task), start.fingers, start.contacts, 1.0, 1.0)
+    for i, (finger, old) in enumerate(zip(built.fingers, flat.fingers, strict=True)):
+        np.testing.assert_allclose(finger.base, [*old.base[:2], HEIGHT], atol=1e-12)
+        before, now = (
+            base + on_finger(m.joint_angles[:, 2 * i : 2 * i + 2], motion.contact_point_link[:, i])
+            for m, base in ((nearer, old.base), (found, finger.base))
+        )
+        np.testing.assert_allclose(now, before, atol=5e-5)
+    # The angles alone would leave them as much too far out as the fingers stand higher.
+    assert np.abs(found.joint_angles - nearer.joint_angles).max() > 0.03
 
 
 def test_a_contact_moved_moves_its_points_on_the_surface() -> None:
