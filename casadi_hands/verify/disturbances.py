@@ -111,8 +111,8 @@ def disturbed_figures(folder: Folder) -> list[Figure]:
     if force is None or torque is None or motion.contact_force_disturbed is None:
         return []
     more = motion.contact_force_disturbed - motion.contact_force
-    arms = np.array([object_rotation(folder).apply(arm) for arm in np.moveaxis(motion.contact_point_object, 1, 0)])
-    turning = np.cross(np.moveaxis(arms, 0, 1), more).sum(axis=1) + torque - motion.external_torque
+    arms = np.einsum("sij,scj->sci", object_rotation(folder).as_matrix(), motion.contact_point_object)
+    turning = np.cross(arms, more).sum(axis=1) + torque - motion.external_torque
     left = np.linalg.norm(more.sum(axis=1) + force - motion.external_force, axis=1) / folder.weight
     spin = np.linalg.norm(turning, axis=1) / (folder.weight * folder.length)
     kind, values = max((("force", left), ("torque", spin)), key=lambda item: float(item[1].max()))

@@ -196,6 +196,13 @@ def _model(path: Path, robot: Robot) -> pin.Model:
     loose = [name for name in robot.links if name != "palm" and children.count(name) != 1]
     if loose or "palm" in children:
         raise DesignError(f"{path}: link '{(loose or ['palm'])[0]}' does not hang on one joint of the hand")
+    above = {joint.child: joint.parent for joint in robot.joints.values()}
+    for name in robot.links:
+        link = name
+        for _ in above:
+            link = above.get(link, link)
+        if link != "palm":
+            raise DesignError(f"{path}: link '{name}' hangs in a ring, not on the palm")
     try:
         return pin.buildModelFromUrdf(str(path))
     except (ValueError, RuntimeError) as error:

@@ -13,6 +13,8 @@ from casadi_hands.verify.stored import same
 
 PATCH = 0.2
 """Torsional friction of a soft fingertip over sliding friction and link radius: (2/3) × a patch of 0.3 radii."""
+LONGEST_STEP = 0.005
+"""s of the simulation: contacts stiffen within about 10 ms."""
 EXACT = 1e-6
 
 
@@ -45,6 +47,8 @@ def palm_moves(folder: Folder) -> bool:
 def _world_problems(folder: Folder, scene: Scene) -> list[str]:
     """Gravity, the ground and friction."""
     problems, ground = [], folder.task.ground
+    if not 0.0 < scene.step <= LONGEST_STEP:
+        problems.append(f"steps of {scene.step:g} s are too long for contacts; at most {LONGEST_STEP:g} s")
     if not np.allclose(scene.gravity, folder.gravity, atol=1e-9, rtol=EXACT):
         problems.append(f"gravity is {scene.gravity.tolist()}, in task.yaml {folder.gravity.tolist()}")
     if len(scene.planes) != (0 if ground is None else 1) or any(plane.kind != "plane" for plane in scene.planes):
@@ -98,6 +102,8 @@ def _body_problems(folder: Folder, scene: Scene) -> list[str]:
         if body.parent != parent:
             problems.append(f"{who} hangs on {body.parent}, not on {parent}")
         problems += _pose_problems(folder, who, body, position, orientation)
+        if body.borne and name not in folder.links:
+            problems.append(f"the weight of {who} is taken off it (gravcomp)")
         if name in due:
             problems += _solid_problems(folder, who, body, due[name])
         if body.mocap != (name == "palm_target") or body.free != (name == "object" or (name == "palm" and moves)):
@@ -185,6 +191,8 @@ def _servo_problems(folder: Folder, scene: Scene) -> list[str]:
             f"its actuators turn {', '.join(names) or 'nothing'}; there must be one a joint, in their order"
         )
     for servo in scene.servos:
+        if servo.name != servo.joint:
+            problems.append(f"the actuator of joint {servo.joint} is called {servo.name}")
         joint = folder.joints.get(servo.joint)
         if joint is not None and not np.allclose(servo.limits, [-joint.effort, joint.effort], rtol=EXACT, atol=0.0):
             problems.append(f"the torque of joint {servo.joint} is not limited to its effort in hand.urdf")

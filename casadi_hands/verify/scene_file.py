@@ -11,7 +11,7 @@ import numpy as np
 from casadi_hands.errors import DesignError
 from casadi_hands.verify.markup import called, name_of, number, numbers, only, positive, read_xml, strangers
 
-_SECTIONS = "compiler option statistic default worldbody contact equality actuator keyframe visual asset size"
+_SECTIONS = "compiler option statistic default worldbody contact equality actuator keyframe visual asset"
 _OPTIONS = "timestep gravity integrator cone impratio noslip_iterations iterations tolerance solver"
 _GEOM = "name type pos fromto size friction condim priority solref solimp rgba"
 _KEY = ("time", "qpos", "ctrl", "mpos", "mquat")
@@ -57,6 +57,7 @@ class SceneBody:
         position: (3,) m, in the parent's frame.
         orientation: (4,) [w, x, y, z], likewise.
         free, mocap: whether it floats freely, or is moved from outside.
+        borne: the share of its weight that is taken off it.
         mass: kg; 0 where none is stated.
         center: (3,) m.
         inertia: (3, 3) kg·m².
@@ -67,6 +68,7 @@ class SceneBody:
     orientation: np.ndarray
     free: bool
     mocap: bool
+    borne: float
     mass: float
     center: np.ndarray
     inertia: np.ndarray
@@ -76,8 +78,9 @@ class SceneBody:
 
 @dataclass(frozen=True)
 class Servo:
-    """A position actuator: the joint it turns, gains, and (2,) limits of its torque, N·m."""
+    """A position actuator: its name, the joint it turns, gains, and (2,) limits of its torque, N·m."""
 
+    name: str
     joint: str
     stiffness: float
     damping: float
@@ -89,6 +92,7 @@ class Scene:
     """What ``scene.xml`` says.
 
     Attributes:
+        step: of the simulation, s.
         gravity: (3,) m/s².
         bodies: by name, in the file's order, which is that of MuJoCo's coordinates.
         planes: of the world.
@@ -99,6 +103,7 @@ class Scene:
         strange: what the format does not have, a sentence each.
     """
 
+    step: float
     gravity: np.ndarray
     bodies: dict[str, SceneBody] = field(default_factory=dict)
     planes: list[Geom] = field(default_factory=list)
@@ -119,11 +124,12 @@ def read_scene(path: Path) -> Scene:
     root = read_xml(path, "mujoco")
     section = {tag: only(path, root, tag) for tag in _SECTIONS.split()}
     option, world = section["option"], section["worldbody"]
+    option = Element("option") if option is None else option
     if world is None:
         raise DesignError(f"{path}: no <worldbody>, so nothing is in the scene")
     if section["compiler"] is None or section["compiler"].get("angle") != "radian":
         raise DesignError(f"{path}: angles are not in radians")
-    scene = Scene(numbers(path, Element("option") if option is None else option, "gravity", 3, "0 0 -9.81"))
+    scene = Scene(number(path, option, "timestep", "0.002"), numbers(path, option, "gravity", 3, "0 0 -9.81"))
     scene.strange.extend(strangers(root, _SECTIONS, "model"))
     allowed = {"compiler": ("", "angle"), "option": ("", _OPTIONS), "default": ("geom", ""), "contact": ("exclude", "")}
     allowed |= {"equality": ("weld", ""), "actuator": ("position", ""), "keyframe": ("key", "")}
@@ -150,7 +156,7 @@ def _read_entry(path: Path, scene: Scene, element: Element) -> None:
     elif element.tag == "position":
         joint = element.get("joint", "")
         kp, kv = positive(path, element, "kp"), number(path, element, "kv", "0")
-        scene.servos.append(Servo(joint, kp, kv, numbers(path, element, "forcerange", 2)))
+        scene.servos.append(Servo(element.get("name", ""), joint, kp, kv, numbers(path, element, "forcerange", 2)))
         odd += strangers(element, "", "name joint kp kv forcelimited forcerange")
         if element.get("forcelimited") != "true":
             odd.append(f"{called(element)} limits no torque: forcelimited is not true")
@@ -169,7 +175,8 @@ def _read_body(path: Path, scene: Scene, element: Element, name: str) -> None:
         scene.planes.extend(geoms)
     else:
         scene.strange.extend(strangers(element, "body geom inertial joint freejoint", "name pos quat gravcomp mocap"))
-        inertial = only(path, element, "inertial")
+        inertial, free = only(path, element, "inertial"), only(path, element, "freejoint")
+        scene.strange.extend(strangers(free, "", "name") if free is not None else ())
         mass, center, inertia = 0.0, np.zeros(3), np.zeros((3, 3))
         if inertial is not None:
             mass, center = positive(path, inertial, "mass"), numbers(path, inertial, "pos", 3)
@@ -180,8 +187,9 @@ def _read_body(path: Path, scene: Scene, element: Element, name: str) -> None:
             parent="",
             position=numbers(path, element, "pos", 3, "0 0 0"),
             orientation=numbers(path, element, "quat", 4, "1 0 0 0"),
-            free=only(path, element, "freejoint") is not None,
+            free=free is not None,
             mocap=element.get("mocap") == "true",
+            borne=number(path, element, "gravcomp", "0"),
             mass=mass,
             center=center,
             inertia=inertia,

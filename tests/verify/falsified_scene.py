@@ -18,6 +18,17 @@ IN_THE_SCENE: Cases = {
     "no scene": (lambda folder: (folder / SCENE).unlink(), r"scene\.xml: missing"),
     "gravity": (attribute(SCENE, "option", "gravity", "0 0 0"), r"scene\.xml: gravity is"),
     "gravity switched off": (added(SCENE, "option", "<flag gravity='disable'/>"), r"<flag> in <option>"),
+    "a step of a second": (attribute(SCENE, "option", "timestep", "1"), r"steps of 1 s are too long"),
+    "an object that weighs nothing": (
+        attribute(SCENE, THING, "gravcomp", "1"),
+        r"the weight of the object is taken off",
+    ),
+    "an object that resists": (attribute(SCENE, THING + "/freejoint", "armature", "9"), r"no attribute armature"),
+    "a motor under another name": (
+        attribute(SCENE, ".//position", "name", "finger2_joint1"),
+        r"the actuator of joint finger0_joint0 is called finger2_joint1",
+    ),
+    "few contacts": (added(SCENE, ".", "<size nconmax='1'/>"), r"<size> in <mujoco"),
     "thick air": (attribute(SCENE, "option", "viscosity", "10"), r"no attribute viscosity"),
     "gravity further down": (added(SCENE, ".", "<option gravity='0 0 0'/>"), r"2 elements <option>"),
     "degrees": (attribute(SCENE, "compiler", "angle", "degree"), r"angles are not in radians"),
