@@ -42,7 +42,9 @@ def elsewhere(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 
 def run(code: list[str], environment: dict[str, str]) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-S", *code], env=environment, capture_output=True, text=True, check=False)
+    return subprocess.run(
+        [sys.executable, "-P", "-S", *code], env=environment, capture_output=True, text=True, check=False
+    )
 
 
 def test_the_player_has_no_access_to_this_package(elsewhere: dict[str, str]) -> None:
