@@ -60,7 +60,7 @@ def test_without_mujoco_the_message_is_one_line(folder: Path, tmp_path: Path, mo
     monkeypatch.setitem(sys.modules, "imageio", SimpleNamespace())
     with pytest.raises(HandsError) as raised:
         film(folder, tmp_path / "film.gif")
-    assert str(raised.value) == "replay needs MuJoCo: pip install 'casadi-hands[sim]'"
+    assert str(raised.value) == "replay needs MuJoCo: pip install mujoco"
 
 
 def test_without_imageio_the_message_is_one_line(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
