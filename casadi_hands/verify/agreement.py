@@ -11,6 +11,8 @@ from casadi_hands.verify.folder import Folder
 from casadi_hands.verify.shapes import Body, is_capsule, swept_inertial
 from casadi_hands.verify.stored import as_array, entry, same
 
+STATUSES = ("certified", "feasible", "failed")
+
 
 def object_problems(folder: Folder) -> list[str]:
     """Return where the object is not the same in ``object.urdf``, ``task.yaml`` and ``result.json``."""
@@ -71,6 +73,8 @@ def record_problems(folder: Folder) -> list[str]:
         if not agrees:
             source = "motion.npz" if key in sizes else "task.yaml"
             problems.append(f"{key}: result.json says {_brief(stated)}, {source} says {_brief(value)}")
+    if record.get("status") not in STATUSES:
+        problems.append(f"status: result.json says {_brief(record.get('status'))}, not one of {', '.join(STATUSES)}")
     return problems + _goal_problems(folder)
 
 

@@ -23,6 +23,9 @@ from casadi_hands.verify.stored import read_motion, read_record
 STANDARD_GRAVITY = 9.81
 """m/s²; scales forces when the task has no gravity."""
 
+FARTHEST_TURN = 1e6
+"""rad; of a turn beyond, rounding leaves nothing."""
+
 
 @dataclass(frozen=True)
 class Folder:
@@ -160,6 +163,9 @@ def read_folder(directory: str | Path, task: str | Path | None = None) -> Folder
         model=_model(path / "hand.urdf", hand),
     )
     _check_names(folder)
+    for number, goal in enumerate(folder.task.motion, start=1):
+        if not np.all(np.abs(goal.rotation.vector) < FARTHEST_TURN):
+            raise DesignError(f"{task or path / 'task.yaml'}: goal {number} turns the object by more than can be told")
     return folder
 
 

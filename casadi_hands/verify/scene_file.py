@@ -147,6 +147,7 @@ def _read_entry(path: Path, scene: Scene, element: Element) -> None:
     odd = scene.strange
     if element.tag == "geom":
         odd += strangers(element, "", "condim solref solimp")
+        _read_looks(path, element)
     elif element.tag == "exclude":
         scene.excluded.append(frozenset((element.get("body1", ""), element.get("body2", ""))))
         odd += strangers(element, "", "name body1 body2")
@@ -206,6 +207,13 @@ def _on(body: SceneBody, parent: str) -> SceneBody:
     return SceneBody(**{**vars(body), "parent": parent})
 
 
+def _read_looks(path: Path, element: Element) -> None:
+    """Read what of a solid is compared with nothing, so that it is numbers."""
+    for name, count in (("rgba", 4), ("solref", 2), ("solimp", 3), ("condim", 1)):
+        if element.get(name) is not None:
+            numbers(path, element, name, count)
+
+
 def _read_hinge(path: Path, scene: Scene, element: Element) -> Hinge:
     scene.strange.extend(strangers(element, "", "name axis ref limited range armature"))
     if element.get("limited") != "true":
@@ -233,5 +241,6 @@ def _read_geom(path: Path, scene: Scene, element: Element) -> Geom:
         start, end = place - reach, place + reach
     elif kind != "plane":
         scene.strange.append(f"{called(element)} is a {kind}, which the format does not have")
+    _read_looks(path, element)
     friction = numbers(path, element, "friction", 3, _FRICTION)
     return Geom(kind, start, end, radius, friction, number(path, element, "priority", "0"))

@@ -32,6 +32,7 @@ DISAGREEMENTS: Cases = {
     "a stated goal's time": (record("goals", 1, "time", value=0.9), r"goal 2 of result\.json"),
     "a stated goal's turn": (record("goals", 1, "orientation", value=[1, 0, 0, 0]), r"goal 2 of result\.json"),
     "a goal less": (record("goals", value=lambda goals: goals[:2]), r"goals: result\.json has 2, task\.yaml has 3"),
+    "a status of its own": (record("status", value="approved"), r"status: result\.json says approved"),
     "degrees of freedom": (
         record("degrees_of_freedom", value=3),
         r"degrees_of_freedom: result\.json says 3, motion\.npz says 6",
