@@ -35,6 +35,8 @@ def certificate_problems(directory: str | Path, figures: Mapping[str, Figure], l
         if abs(float(value) - figure.value) > near:
             said, found = show(float(value), figure.unit), show(figure.value, figure.unit)
             problems.append(f"certificate: result.json says {name} is {said}, the files give {found}")
+        if limits and entry(stated, name, "holds") not in (None, figure.holds):
+            problems.append(f"certificate: result.json says {name} {'holds' if not figure.holds else 'is missed'}")
         if limits and not _agree(limit, figure.limit):
             problems.append(f"certificate: the limit of {name} in result.json is not the task's")
     return problems

@@ -81,7 +81,7 @@ def read_robot(path: Path) -> Robot:
         elif element.tag == "mujoco":
             strange += _compiler(element)
         elif element.tag == "transmission":
-            strange += _transmission(element)
+            strange += _transmission(element, {joint.get("name") for joint in root.findall("joint")})
     return Robot(links, joints, tuple(f"{path.name}: {what}" for what in strange))
 
 
@@ -92,9 +92,11 @@ def _compiler(element: Element) -> list[str]:
     return found
 
 
-def _transmission(element: Element) -> list[str]:
-    """Return what is wrong with a motor that does not turn its joint one to one."""
+def _transmission(element: Element, joints: set[str | None]) -> list[str]:
+    """Return what is wrong with a motor that does not turn one of the joints one to one."""
     found = list(strangers(element, "type joint actuator", "name"))
+    turned = [joint.get("name") for joint in element.findall("joint")]
+    found += [f"{called(element)} turns joint '{name}', which there is not" for name in turned if name not in joints]
     for ratio in element.iter("mechanicalReduction"):
         if (ratio.text or "").strip() not in ("1", "1.0"):
             found.append(f"{called(element)} reduces by {(ratio.text or 'nothing').strip()[:20]}, not by 1")
@@ -154,6 +156,8 @@ def _read_link(path: Path, name: str, link: Element) -> tuple[Body, list[str]]:
         cylinders: list[Cylinder] = []
         for element in link.findall(role):
             strange += strangers(element, "origin geometry material")
+            for color in element.iter("color"):
+                numbers(path, color, "rgba", 4)
             _read_shape(path, name, element, spheres, cylinders)
         shapes[role] = spheres, cylinders
     if not _alike(*shapes["collision"], *shapes["visual"]):

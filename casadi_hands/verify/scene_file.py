@@ -125,6 +125,8 @@ def read_scene(path: Path) -> Scene:
     section = {tag: only(path, root, tag) for tag in _SECTIONS.split()}
     option, world = section["option"], section["worldbody"]
     option = Element("option") if option is None else option
+    for name in ("impratio", "noslip_iterations", "iterations", "tolerance"):
+        number(path, option, name, "0")
     if world is None:
         raise DesignError(f"{path}: no <worldbody>, so nothing is in the scene")
     if section["compiler"] is None or section["compiler"].get("angle") != "radian":

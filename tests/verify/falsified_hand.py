@@ -205,6 +205,10 @@ HIDDEN: Cases = {
     ),
     "an element nobody knows": (added(HAND, ".", "<gazebo reference='palm'/>"), r"<gazebo> in <robot"),
     "a joint that mimics": (added(HAND, JOINT, "<mimic joint='finger0_joint0'/>"), r"<mimic> in <joint"),
+    "a motor of no joint": (
+        added(HAND, ".", "<transmission name='t'><joint name='finger9_joint0'/></transmission>"),
+        r"turns joint 'finger9_joint0', which there is not",
+    ),
     "a gear": (
         added(
             HAND,

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fixture import Scene, carried, object_urdf, read_task
+from fixture import SPHERE, Scene, carried, object_urdf, plain, read_task
 
 from casadi_hands.errors import DesignError
 from casadi_hands.task import task_to_yaml
@@ -201,6 +201,23 @@ def test_unreadable_motion_is_refused(
     np.savez(folder / "motion.npz", **arrays)
     with pytest.raises(DesignError, match=message):
         audit(folder)
+
+
+def test_a_hand_of_one_joint_is_audited(tmp_path: Path) -> None:
+    text = SPHERE.replace(", right: {touches: [0.03, 0, 0]}", "") + "gravity: [0, 0, 0]\n"
+    force = np.tile([0.1, 0.0, 0.0], (11, 1, 1))
+    scene = plain(
+        read_task(tmp_path, text),
+        np.linspace(0.0, 1.0, 11),
+        contact_active=np.ones((11, 1), dtype=bool),
+        contact_force=force,
+        contact_point_object=np.tile([-0.03, 0.0, 0.0], (11, 1, 1)),
+    )
+    found = audit(scene.write(tmp_path / "result"))
+    assert scene.hand.degrees_of_freedom == 1
+    assert not found.figures["residual"].holds
+    assert not found.figures["gap"].holds
+    assert found.problems == ()
 
 
 @pytest.mark.parametrize("name", ["task.yaml", "hand.urdf", "object.urdf", "motion.npz", "result.json"])
