@@ -31,7 +31,7 @@ def package_xml(package: str, task: str) -> str:
   <version>0.0.0</version>
   <description>A robot hand and its motion, designed by casadi-hands for the task: {escape(task)}</description>
   <maintainer email="user@todo.todo">user</maintainer>
-  <license>TODO: License declaration</license>
+  <license>none stated</license>
   <buildtool_depend>ament_cmake</buildtool_depend>
 {dependencies}
   <export>
