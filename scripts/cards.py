@@ -33,7 +33,8 @@ def page(cards: list[list[Entry]], place: Path) -> str:
     so_far = "" if solved == len(best) else f" of {solved} solved so far,"
     summary = (
         f"Robot hands designed from task files: topology, morphology, motion and forces. {len(best)} tasks;{so_far} "
-        f"{count['certified']} certified: recomputed from the result's files, every physical limit holds."
+        f"{count['certified']} certified: recomputed from the result's files, every physical limit holds, and replayed "
+        "in MuJoCo the hand does its task."
     )
     parts = {
         "title": "Hands by casadi-hands",
