@@ -22,6 +22,7 @@ from casadi_hands.pipeline.judge import Judge
 from casadi_hands.task import Task, parse_task
 from casadi_hands.task.limits import Limits
 from casadi_hands.verify import audit
+from tests.pipeline.replayed import replayed
 from tests.search import example
 from tests.stages.test_model import scaled
 
@@ -291,7 +292,7 @@ def test_ten_times_larger_gives_the_same_hand_ten_times_larger(
     translated: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Links ten times larger are a thousand times heavier, beside an object that is not: replays are not similar.
-    monkeypatch.setattr(Judge, "replayed", lambda self, design, jobs=1: design)
+    monkeypatch.setattr(Judge, "replayed", lambda self, design, jobs=1: replayed(design, 0))
     design = solve(ten_times_larger(), jobs=1, out=tmp_path)
     small = Design.load(translated)
     assert small.hand is not None
