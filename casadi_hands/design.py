@@ -160,9 +160,9 @@ class Design:
         if not self.replays:
             return ""
         first = self.replays[0]
-        planned = f"{first['mean']['mm']:.2g} mm and {first['mean']['degrees']:.2g}° off plan on average"
-        if first["dropped_as_planned"]:
-            planned = "drops the object as planned"
+        planned = "drops the object as planned"
+        if not first["dropped_as_planned"]:
+            planned = f"{first['mean']['mm']:.2g} mm and {first['mean']['degrees']:.2g}° off plan on average"
         return f"in MuJoCo {planned}, {first['dropped']} of {first['of']} perturbed replays drop it"
 
     def save(self, directory: str | Path) -> None:

@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from casadi_hands.task import Capsule, Goal, Limits, Task
+from casadi_hands.task.limits import usual_replay_position
 
 
 def task_summary(task: Task) -> RenderableType:
@@ -44,7 +45,7 @@ def _lines(task: Task) -> Iterator[tuple[str, str]]:
             f"at most {search.max_joints} joints a finger, seed {search.seed}"
         ),
     )
-    usual = Limits(replay_position=max(0.002, 0.05 * task.object.half_extent))
+    usual = Limits(replay_position=usual_replay_position(task.object.half_extent))
     changed = {name: value for name, value in task.limits if value != getattr(usual, name)}
     if changed:
         yield (

@@ -132,15 +132,11 @@ def motor_remedy(directory: str, design: Design) -> str | None:
         directory: the design's files.
         design: that misses limits in replays.
     """
-    limits, hand = design.task.limits, design.hand
+    hand = design.hand
     assert hand is not None
     stiffest = max(motor.stiffness for motor in joint_motors(design.task, hand))
     for change, seen in stronger_motors(directory):
-        near = all(
-            goal.position <= limits.replay_position and (goal.angle is None or goal.angle <= limits.replay_angle)
-            for goal in seen.goals
-        )
-        if near and not seen.dropped:
+        if all(figure.holds for figure in seen.figures()):
             motors = f"{change.effort * hand.effort:.3g} N·m (actuator.torque)"
             if change.stiffness == 1:
                 how = f"pressing {change.squeeze:g} times as hard, with motors of {motors}"

@@ -7,6 +7,11 @@ from pydantic import Field
 from casadi_hands.task.fields import NonNegative, Section
 
 
+def usual_replay_position(half_extent: float) -> float:
+    """The default of ``replay_position``, m, for an object with this half extent, m."""
+    return max(0.002, 0.05 * half_extent)
+
+
 class Limits(Section):
     """Limits of the certificate; weight means mass times gravity (9.81 m/s² where gravity is off)."""
 

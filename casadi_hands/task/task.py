@@ -10,7 +10,7 @@ from pydantic import Field, ValidationInfo, field_validator
 from casadi_hands.motion import nearest_exponential
 from casadi_hands.task.fields import Positive, Section, Vector, Whole, fill, refuse
 from casadi_hands.task.hand import Actuator, FingerSpec, Ground, HandSpec
-from casadi_hands.task.limits import Limits
+from casadi_hands.task.limits import Limits, usual_replay_position
 from casadi_hands.task.motion import Goal, Perturbation
 from casadi_hands.task.object import ManipulatedObject
 from casadi_hands.task.palm import Palm
@@ -103,7 +103,7 @@ class Task(Section):
     @classmethod
     def _limits_defaults(cls, value: Any, info: ValidationInfo) -> Any:
         body = info.data.get("object")
-        return fill(value, replay_position=max(0.002, 0.05 * body.half_extent) if body else 1.0)
+        return fill(value, replay_position=usual_replay_position(body.half_extent) if body else 1.0)
 
     @property
     def draws(self) -> bool:

@@ -200,7 +200,7 @@ class Player:
         errors = np.stack(plan.errors(positions, quaternions), axis=1)
         due = [c for c in range(len(folder.motion.contact_names)) if folder.motion.contact_active[-1, c]]
         lost = [c for c in due if not scene.touches(folder.motion.contact_link[c])]
-        gone = errors[:, 0].max() > DROP * folder.length
+        gone = not errors[:, 0].max() <= DROP * folder.length  # so that no number at all is gone, too
         mean, largest, final = (values.tolist() for values in (errors.mean(axis=0), errors.max(axis=0), errors[-1]))
         return Replay(
             position_mean=mean[0],

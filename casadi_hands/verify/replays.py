@@ -155,7 +155,7 @@ def run_replays(
     return Replays(engine, player.folder.task, float(player.plan.time[1]), seed, nominal, tuple(perturbed))
 
 
-def stronger_motors(directory: str | Path) -> Iterator[tuple[Perturbation, Replay]]:
+def stronger_motors(directory: str | Path) -> Iterator[tuple[Perturbation, Replays]]:
     """Replay as planned with motors that press harder, and have the torque for that, then with stiffer ones.
 
     Args:
@@ -165,9 +165,13 @@ def stronger_motors(directory: str | Path) -> Iterator[tuple[Perturbation, Repla
         what was changed, and how it went.
     """
     player = Player(directory)
+
+    def played_with(change: Perturbation) -> tuple[Perturbation, Replays]:
+        seen = player.play(change)
+        assert player.plan is not None
+        return change, Replays("mujoco", player.folder.task, float(player.plan.time[1]), 0, seen, ())
+
     for factor in (1.5, 2.0, 3.0, 4.0, 6.0, 8.0):
-        change = Perturbation(effort=factor, squeeze=factor)
-        yield change, player.play(change)
+        yield played_with(Perturbation(effort=factor, squeeze=factor))
     for factor in (2.0, 4.0, 8.0):
-        change = Perturbation(effort=factor, stiffness=factor)
-        yield change, player.play(change)
+        yield played_with(Perturbation(effort=factor, stiffness=factor))

@@ -6,10 +6,15 @@ from dataclasses import replace
 
 import pytest
 
+from casadi_hands.export.motors import joint_motors
+from casadi_hands.pipeline import words
 from casadi_hands.pipeline.holding import MOST_GRIP
 from casadi_hands.pipeline.words import friction_reason, missed_figures, speed_reason, torque_reason
 from casadi_hands.task.hand import Actuator
+from casadi_hands.verify import Perturbation, Replay, Replays
+from casadi_hands.verify.replay import GoalError
 from casadi_hands.verify.report import Audit, Figure
+from tests.export.example import example_design
 from tests.pipeline.test_holding import WEIGHT, still, upright
 
 
@@ -119,3 +124,27 @@ def test_the_friction_advised_does(friction: float) -> None:
     assert reason is not None
     advised = float(reason.advice.split()[2])
     assert friction_reason(*still(advised * 1.01)) is None
+
+
+def test_the_first_motors_that_bring_the_hand_to_every_goal_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    design = example_design()
+    assert design.hand is not None
+
+    def seen(millimetres: float, dropped: bool = False) -> Replays:
+        goals = tuple(GoalError(1e-3 * millimetres, 1.0) for _ in design.task.motion)
+        nominal = Replay(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, dropped, (), Perturbation(), goals)
+        return Replays("mujoco", design.task, 1e-3, 0, nominal, ())
+
+    tried = [
+        (Perturbation(effort=2.0, squeeze=2.0), seen(9.0)),
+        (Perturbation(effort=3.0, squeeze=3.0), seen(1.0, dropped=True)),
+        (Perturbation(effort=4.0, stiffness=4.0), seen(1.0)),
+    ]
+    monkeypatch.setattr(words, "stronger_motors", lambda directory: iter(tried))
+    stiffest = max(motor.stiffness for motor in joint_motors(design.task, design.hand))
+    assert words.motor_remedy("folder", design) == (
+        f"In the same replay with motors of {4 * design.hand.effort:.3g} N·m (actuator.torque) and up to "
+        f"{4 * stiffest:.3g} N·m/rad, this hand reaches every goal"
+    )
+    del tried[2]
+    assert words.motor_remedy("folder", design) is None
