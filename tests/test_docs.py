@@ -19,7 +19,9 @@ import casadi_hands
 from casadi_hands import Design
 from casadi_hands.cli.app import app
 from casadi_hands.task import describe_fields, load_task, parse_task
+from casadi_hands.verify import audit
 from tests.documents import PAGES, README, ROOT, blocks, commands, heading_anchors, links, read
+from tests.verify.fixture import carried
 
 NUMBERS = {"N": "1", "K": "1"}
 """What stands for a number in a command of the documents."""
@@ -233,10 +235,15 @@ def test_reference_of_fields_is_up_to_date() -> None:
     assert read(ROOT / "docs/task-fields.md") == describe_fields() + "\n"
 
 
-def test_every_figure_of_the_audit_is_explained(solved: tuple[Path, str]) -> None:
+def test_every_figure_of_the_audit_is_explained(tmp_path: Path, solved: tuple[Path, str]) -> None:
+    pushed = carried(tmp_path / "task", "perturbations:\n  - {from: 0.55, to: 0.95, force: [0, 0, 0.1]}\n")
+    figures = {
+        **audit(pushed.write(tmp_path / "result")).figures,
+        **Design.load(solved[0] / "results/mine").certificate,
+    }
     rows = [line.split("|")[1] for line in read(ROOT / "docs/reading-the-verdict.md").splitlines() if "| `" in line]
     explained = {name for row in rows for name in re.findall(r"`(\w+)`", row)}
-    assert set(Design.load(solved[0] / "results/mine").certificate) <= explained
+    assert {"residual_disturbed", "replay_dropped"} <= set(figures) <= explained
 
 
 def test_every_array_of_the_motion_is_explained(solved: tuple[Path, str]) -> None:
