@@ -6,9 +6,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from casadi_hands.alternatives import explore
-    from casadi_hands.design import Design
+    from casadi_hands.export.design import Design
     from casadi_hands.pipeline import solve
+    from casadi_hands.pipeline.alternatives import explore
     from casadi_hands.task import load_task
     from casadi_hands.verify import audit, replay
 
@@ -16,9 +16,9 @@ __version__ = "0.1.0"
 __all__ = ["Design", "audit", "explore", "load_task", "replay", "solve"]
 
 _HOME = {
-    "Design": "casadi_hands.design",
+    "Design": "casadi_hands.export.design",
     "audit": "casadi_hands.verify",
-    "explore": "casadi_hands.alternatives",
+    "explore": "casadi_hands.pipeline.alternatives",
     "load_task": "casadi_hands.task",
     "replay": "casadi_hands.verify",
     "solve": "casadi_hands.pipeline",

@@ -28,11 +28,12 @@ from profiled import KINDS, cores_used, profiled_solve
 from shared import NOTHING, options_of, write_table
 
 from casadi_hands import load_task
-from casadi_hands.search.seeds import random_finger
-from casadi_hands.stages.floating import FloatingStage, solve_floating
-from casadi_hands.stages.model import build_model
-from casadi_hands.stages.synthesis import FingerSeed, SynthesisStage
-from casadi_hands.stages.target import Target, target_of
+from casadi_hands.kinematics.morphology import FingerSeed
+from casadi_hands.problem.si import build_model
+from casadi_hands.stages.floating.stage import FloatingStage, solve_floating
+from casadi_hands.stages.synthesis.seeds import random_finger
+from casadi_hands.stages.synthesis.stage import SynthesisStage
+from casadi_hands.stages.synthesis.target import Target, target_of
 from casadi_hands.task import Task
 
 OURS = "IPOPT, exact Hessian (ours)"

@@ -17,8 +17,8 @@ from peers import Posed, recorded_solves
 from profiled import CALLED
 
 from casadi_hands import load_task, solve
-from casadi_hands.nlp import Problem, Solver, assembly, machine_code
-from casadi_hands.nlp.assembly import KernelFunctions, kernel_functions
+from casadi_hands.nlp import Problem, Solver, derivatives, machine_code
+from casadi_hands.nlp.derivatives import KernelFunctions, kernel_functions
 
 Vector = NDArray[np.float64]
 FUNCTIONS = {"value": "nlp", "gradient": "grad_f", "Jacobian": "jac_g", "Hessian": "hess_lag"}
@@ -109,7 +109,7 @@ def _optimised() -> Any:
     """Kernels compiled with -O2 meanwhile, whatever their size."""
     with (
         patch.object(machine_code, "_OPTIMISED", ("-O2", "-O2")),
-        patch.object(assembly, "_known", {}),
+        patch.object(derivatives, "_known", {}),
     ):
         yield
 

@@ -23,17 +23,21 @@ import numpy as np
 from isolated import isolated, largest_memory
 from shared import NOTHING, options_of, write_table
 
+from casadi_hands.kinematics.morphology import FingerSeed
 from casadi_hands.nlp import Options, Solution, Solver
-from casadi_hands.search.seeds import random_finger
-from casadi_hands.stages.floating import Floating, FloatingStage
-from casadi_hands.stages.model import Model, build_model
-from casadi_hands.stages.object_side import object_parameters, sizes, term_weights
-from casadi_hands.stages.refine import LONG_WAY, RefineStage
-from casadi_hands.stages.refine_values import Margin
-from casadi_hands.stages.synthesis import OPTIONS, FingerSeed, SynthesisStage
-from casadi_hands.stages.target import Target, target_of
-from casadi_hands.stages.whole_hand import OPTIONS as WHOLE
-from casadi_hands.stages.whole_hand import WholeHandStage
+from casadi_hands.problem.floating_motion import Floating
+from casadi_hands.problem.model import Model, sizes
+from casadi_hands.problem.si import build_model
+from casadi_hands.stages.floating.stage import FloatingStage
+from casadi_hands.stages.object_motion.values import object_parameters, term_weights
+from casadi_hands.stages.refine.settings import LONG_WAY
+from casadi_hands.stages.refine.stage import RefineStage
+from casadi_hands.stages.refine.values import Margin
+from casadi_hands.stages.synthesis.seeds import random_finger
+from casadi_hands.stages.synthesis.stage import OPTIONS, SynthesisStage
+from casadi_hands.stages.synthesis.target import Target, target_of
+from casadi_hands.stages.whole_hand.stage import OPTIONS as WHOLE
+from casadi_hands.stages.whole_hand.stage import WholeHandStage
 from casadi_hands.task import Task, parse_task
 
 ITERATIONS = 8

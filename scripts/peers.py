@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from casadi_hands.nlp import Kernel, Options, Problem, Rows, Solution, Solver, assembly, machine_code
+from casadi_hands.nlp import Kernel, Options, Problem, Rows, Solution, Solver, derivatives, machine_code
 from casadi_hands.nlp.assembly import to_dm
 
 Vector = NDArray[np.float64]
@@ -156,7 +156,7 @@ def by_scipy(build: Build, programs: Sequence[Posed], limit: float, *, name: str
 @contextmanager
 def _interpreted() -> Iterator[None]:
     """Build problems meanwhile as where there is no compiler."""
-    with patch.object(machine_code, "compiler", lambda: None), patch.object(assembly, "_known", {}):
+    with patch.object(machine_code, "compiler", lambda: None), patch.object(derivatives, "_known", {}):
         yield
 
 

@@ -14,10 +14,10 @@ from unittest.mock import patch
 from casadi_hands import load_task, solve
 from casadi_hands.nlp import Options, Solution, Solver
 from casadi_hands.pipeline import Progress, judge
-from casadi_hands.stages.floating import FloatingStage
-from casadi_hands.stages.refine import RefineStage
-from casadi_hands.stages.synthesis import SynthesisStage
-from casadi_hands.stages.whole_hand import WholeHandStage
+from casadi_hands.stages.floating.stage import FloatingStage
+from casadi_hands.stages.refine.stage import RefineStage
+from casadi_hands.stages.synthesis.stage import SynthesisStage
+from casadi_hands.stages.whole_hand.stage import WholeHandStage
 
 KINDS = ("building", "value", "gradient", "Jacobian", "Hessian", "rest of IPOPT", "replays", "audits")
 CALLED = {"value": ("nlp_f", "nlp_g"), "gradient": ("nlp_grad_f",), "Jacobian": ("nlp_jac_g",)}

@@ -14,12 +14,12 @@ from pathlib import Path
 from shared import SEEDS, options_of, write_table
 
 from casadi_hands import load_task
-from casadi_hands.search.algorithm import Candidate, Search
-from casadi_hands.search.score import THRESHOLD
-from casadi_hands.search.work import processes
-from casadi_hands.stages.floating import FloatingStage
-from casadi_hands.stages.model import build_model
-from casadi_hands.stages.target import Target, target_of
+from casadi_hands.execution.processes import processes
+from casadi_hands.problem.si import build_model
+from casadi_hands.stages.floating.stage import FloatingStage
+from casadi_hands.stages.synthesis.algorithm import Candidate, Search
+from casadi_hands.stages.synthesis.score import THRESHOLD
+from casadi_hands.stages.synthesis.target import Target, target_of
 from casadi_hands.task import Task
 
 PROBLEMS = Path(__file__).parents[1] / "problems"

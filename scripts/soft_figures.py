@@ -16,11 +16,11 @@ from shared import NOTHING, SEEDS, joints_of, kept_solve, options_of, write_tabl
 
 from casadi_hands import Design
 from casadi_hands.errors import DesignError
-from casadi_hands.verify.clearance import penetration_figure
-from casadi_hands.verify.contact import Placements, active_contacts, surface_normals
-from casadi_hands.verify.dynamics import sample_residual, shoot
-from casadi_hands.verify.folder import Folder, read_folder
-from casadi_hands.verify.goals import goal_figures
+from casadi_hands.verify.figures.clearance import penetration_figure
+from casadi_hands.verify.figures.contact import Placements, active_contacts, surface_normals
+from casadi_hands.verify.figures.dynamics import sample_residual, shoot
+from casadi_hands.verify.figures.goals import goal_figures
+from casadi_hands.verify.reading.folder import Folder, read_folder
 from casadi_hands.verify.trajectory import build_trajectory, sample_placements
 
 HEAD = (

@@ -10,12 +10,12 @@ from camera import Camera, look, png
 from raycast import Capsule, Disc, draw, overlay
 
 from casadi_hands import Design
-from casadi_hands.design import Hand
 from casadi_hands.export.markup import OBJECT_COLOR, PALM_COLOR, finger_color, joint_color
+from casadi_hands.export.page.robot import Robot
+from casadi_hands.export.page.scene import EXTERNAL_COLOR, FORCE_COLOR, GOAL_COLOR, eye_towards
+from casadi_hands.export.page.timeline import Timeline, design_timeline, goal_poses
 from casadi_hands.export.urdf import hand_urdf
-from casadi_hands.view.robot import Robot
-from casadi_hands.view.scene import EXTERNAL_COLOR, FORCE_COLOR, GOAL_COLOR, eye_towards
-from casadi_hands.view.timeline import Timeline, design_timeline, goal_poses
+from casadi_hands.problem.hand import Hand
 
 MOMENTS = 5
 """Pictures of a motion, evenly in time, start and end among them."""

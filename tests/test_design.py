@@ -7,9 +7,9 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from casadi_hands.design import Design
 from casadi_hands.errors import DesignError
 from casadi_hands.export.commands import commanded
+from casadi_hands.export.design import Design
 from casadi_hands.export.folder import save_design
 from casadi_hands.task import parse_task
 from tests.export.example import TASK, example_design

@@ -23,8 +23,8 @@ from casadi_hands.task import Task, parse_task
 from casadi_hands.task.limits import Limits
 from casadi_hands.verify import audit
 from tests.pipeline.replayed import replayed
-from tests.search import example
-from tests.stages.test_model import scaled
+from tests.problem.test_model import scaled
+from tests.stages.synthesis import example
 
 PROBLEMS = Path(__file__).parents[1] / "problems"
 CAPSULE = PROBLEMS / "horizontal_translation.yaml"

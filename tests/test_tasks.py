@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from casadi_hands import Design, load_task, solve
-from casadi_hands.design import Motion
+from casadi_hands.problem.motion import Motion
 from casadi_hands.task import Task
 from casadi_hands.verify import replay
 

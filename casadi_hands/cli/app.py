@@ -129,8 +129,9 @@ def solve(
 
     with leave_on_interrupt(stopped), reporter, ExitStack() as stack:
         # Within the reporter, because CasADi and Pinocchio take seconds to load.
-        from casadi_hands import alternatives, pipeline
-        from casadi_hands.search.cluster import cluster
+        from casadi_hands import pipeline
+        from casadi_hands.execution.cluster import cluster
+        from casadi_hands.pipeline import alternatives
 
         workers = stack.enter_context(cluster(executor)) if executor else None
         if seeds > 1:
@@ -180,7 +181,7 @@ def check(task: TaskFile) -> None:
 @app.command()
 def view(folder: Folder) -> None:
     """Open a design's page in the browser: the hand and the object moving."""
-    from casadi_hands.view.page import open_page
+    from casadi_hands.export.page.page import open_page
 
     print(open_page(folder))
 
@@ -278,7 +279,7 @@ def replay(
 
     played = verify.run_replays(folder, perturb, seed, jobs or os.cpu_count() or 1, engine)
     if video is not None:
-        from casadi_hands.verify.video import film
+        from casadi_hands.verify.replays.video import film
 
         film(folder, video)
     Console().print(replay_summary(played))

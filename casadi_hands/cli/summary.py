@@ -16,8 +16,8 @@ from rich.text import Text
 from casadi_hands.verify.report import show
 
 if TYPE_CHECKING:
-    from casadi_hands.alternatives import Alternative
-    from casadi_hands.design import Design
+    from casadi_hands.export.design import Design
+    from casadi_hands.pipeline.alternatives import Alternative
     from casadi_hands.verify import Audit, Replay, Replays
 
 _STYLES = {"certified": "bold green", "feasible": "bold yellow", "failed": "bold red"}
@@ -129,7 +129,7 @@ def _place(one: Alternative, best: bool) -> str:
     if not one.kept:
         return "dropped: enough others are better"
     # Late, because it loads the solver, which other summaries do without.
-    from casadi_hands.alternatives import seed_folder
+    from casadi_hands.pipeline.alternatives import seed_folder
 
     place = str(seed_folder(Path(), one.seed))
     return f"{place}, and here" if best else place

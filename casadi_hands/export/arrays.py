@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from casadi_hands.design import Motion
 from casadi_hands.errors import DesignError
+from casadi_hands.problem.motion import Motion
 
 _NAMES = ("joint_names", "contact_names", "contact_link")
 # Shapes as the result format gives them: S samples, J joints, C contacts.

@@ -13,8 +13,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from casadi_hands.design import Hand, Motion
-from casadi_hands.export.motors import joint_motors
+from casadi_hands.problem.hand import Hand
+from casadi_hands.problem.motion import Motion
+from casadi_hands.problem.motors import joint_motors
 from casadi_hands.task import Task
 
 

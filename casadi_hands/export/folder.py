@@ -6,16 +6,16 @@ import json
 from pathlib import Path
 from typing import Any
 
-from casadi_hands.design import Design
 from casadi_hands.errors import DesignError, TaskError
 from casadi_hands.export.arrays import load_motion, save_motion
 from casadi_hands.export.commands import commanded
 from casadi_hands.export.mjcf import scene_mjcf
+from casadi_hands.export.page.page import write_page
 from casadi_hands.export.record import FORMAT, STATUSES, design_record, hand_from_record, record_text
 from casadi_hands.export.table import motion_table
 from casadi_hands.export.urdf import hand_urdf, object_urdf
+from casadi_hands.problem.result import Result
 from casadi_hands.task import load_task, task_to_yaml
-from casadi_hands.view.page import write_page
 
 _FILES = (
     "task.yaml",
@@ -30,7 +30,7 @@ _FILES = (
 _ENTRIES = ("status", "reason", "hand", "samples", "costs", "certificate", "stages", "seconds")
 
 
-def save_design(design: Design, directory: Path, page: bool = True) -> None:
+def save_design(design: Result, directory: Path, page: bool = True) -> None:
     """Write a design's folder; of a partial design, the files for which there is something to write.
 
     Files of an earlier design in the folder are replaced or removed. ``result.json`` comes last, so a folder that has
@@ -55,7 +55,7 @@ def save_design(design: Design, directory: Path, page: bool = True) -> None:
         raise DesignError(f"{directory}: cannot write the design here: {error}") from error
 
 
-def _write(design: Design, directory: Path, page: bool) -> None:
+def _write(design: Result, directory: Path, page: bool) -> None:
     motion = design.motion
     texts = {"task.yaml": task_to_yaml(design.task), "object.urdf": object_urdf(design.task)}
     if design.hand is not None:
@@ -93,8 +93,8 @@ def remove_design(directory: Path) -> None:
         raise DesignError(f"{directory}: cannot remove the design here: {error}") from error
 
 
-def load_design(directory: Path) -> Design:
-    """Read a design's folder.
+def read_design(directory: Path) -> dict[str, Any]:
+    """The fields of the design in a folder, by name.
 
     Args:
         directory: what `save_design` wrote.
@@ -114,7 +114,7 @@ def load_design(directory: Path) -> Design:
     motion = load_motion(directory / "motion.npz") if record["samples"] is not None else None
     if hand is not None and motion is not None and motion.joint_names != hand.joint_names:
         raise DesignError(f"{directory}: motion.npz moves other joints than those of the hand in result.json")
-    return Design(
+    return dict(
         task=task,
         status=record["status"],
         reason=record["reason"],

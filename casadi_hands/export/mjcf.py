@@ -9,7 +9,7 @@ Choices a reader of the file should know:
   ground's wherever anything touches the ground. Fingertips are soft: torsional friction is that of a patch with 0.3
   of the link's radius, (2/3)·μ·patch, and the contact gives over 2 % of the object's size. Creep, an artefact of
   MuJoCo's regularised friction, is held down by ``impratio`` and the no-slip pass.
-- **Motors.** See `casadi_hands.export.motors`; torque is limited to the hand's effort. The hand carries its own weight
+- **Motors.** See `casadi_hands.problem.motors`; torque is limited to the hand's effort. The hand carries its own weight
   (``gravcomp``), as a controller that knows its hand does. Targets are not clamped, so that a feed-forward torque can
   be given as an offset of the target (see `casadi_hands.export.commands`).
 - **Start.** Bodies stand as at the motion's first sample, whose joint angles are the joints' reference: what loads the
@@ -27,7 +27,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.export.commands import commanded
-from casadi_hands.export.inertia import Inertial, link_inertial, palm_inertial
 from casadi_hands.export.markup import (
     GROUND_COLOR,
     OBJECT_COLOR,
@@ -38,10 +37,12 @@ from casadi_hands.export.markup import (
     number,
     numbers,
 )
-from casadi_hands.export.motors import Motor, joint_motors
+from casadi_hands.problem.inertia import Inertial, link_inertial, palm_inertial
+from casadi_hands.problem.motors import Motor, joint_motors
 
 if TYPE_CHECKING:
-    from casadi_hands.design import Finger, Hand, Motion
+    from casadi_hands.problem.hand import Finger, Hand
+    from casadi_hands.problem.motion import Motion
     from casadi_hands.task import Ground, Task
 
 _TIME_STEP = 0.001  # s

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from casadi_hands.design import Design, Finger, Hand, Link
 from casadi_hands.errors import DesignError
+from casadi_hands.problem.hand import Finger, Hand, Link
+from casadi_hands.problem.result import Result
 from casadi_hands.task import task_to_yaml
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ STATUSES = ("certified", "feasible", "failed")
 _PACKAGES = ("casadi-hands", "casadi", "pin", "coal", "mujoco", "numpy")
 
 
-def design_record(design: Design) -> dict[str, Any]:
+def design_record(design: Result) -> dict[str, Any]:
     """All of ``result.json`` as plain lists and dictionaries; a number that is not finite becomes None.
 
     Args:

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from casadi_hands.design import Motion
 from casadi_hands.export.markup import number
+from casadi_hands.problem.motion import Motion
 
 _UNITS = {
     "time": "s",

@@ -9,7 +9,6 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from casadi_hands.export.inertia import Inertial, link_inertial, palm_inertial
 from casadi_hands.export.markup import (
     OBJECT_COLOR,
     PALM_COLOR,
@@ -20,9 +19,10 @@ from casadi_hands.export.markup import (
     number,
     numbers,
 )
+from casadi_hands.problem.inertia import Inertial, link_inertial, palm_inertial
 
 if TYPE_CHECKING:
-    from casadi_hands.design import Finger, Hand
+    from casadi_hands.problem.hand import Finger, Hand
     from casadi_hands.task import Task
 
 _UPRIGHT = 1e-12  # of a unit vector, what no direction can be read off

@@ -2,10 +2,54 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal
 
 import casadi as ca
 from casadi import SX
+
+
+@dataclass(frozen=True)
+class Local:
+    """A local variable or parameter of a kernel.
+
+    Attributes:
+        name: unique in its kernel.
+        symbol: (n,).
+        quantity: what it is; only what is labelled so can be bound to it.
+        place: its rank among several of one quantity: times in their order, or one body and another; None of one alone.
+    """
+
+    name: str
+    symbol: SX
+    quantity: str
+    place: int | None
+
+    @property
+    def size(self) -> int:
+        """Number of entries."""
+        return int(self.symbol.numel())
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """What is constrained, declared once.
+
+    Attributes:
+        name: unique in its kernel.
+        equation: where it comes from.
+        unit: of its values: ``length``, ``force``, ``torque``, ``speed``, ``angle``, or none that a reader would know.
+        cannot: what is not done where it is violated; continues ``finger 'x' cannot ...``.
+        advice: what to try then.
+        explains: figures of the audit that follow then.
+    """
+
+    name: str
+    equation: str = ""
+    unit: str = ""
+    cannot: str = ""
+    advice: str = ""
+    explains: tuple[str, ...] = ()
 
 
 class Kernel:
@@ -18,22 +62,34 @@ class Kernel:
     def __init__(self, name: str) -> None:
         """Start without variables, parameters or terms; ``name`` appears in errors and names the constraints."""
         self.name = name
-        self._variables: list[tuple[str, SX]] = []
-        self._parameters: list[tuple[str, SX]] = []
+        self.locals: dict[str, Local] = {}
+        self._variables: list[Local] = []
+        self._parameters: list[Local] = []
         self.terms: dict[str, SX] = {}
         self.constraints: dict[str, SX] = {}
+        self.declared: dict[str, Constraint] = {}
 
-    def variable(self, name: str, size: int) -> SX:
-        """A local variable (size,), to be bound to rows of the problem's variables in the order of declaration."""
-        symbol = SX.sym(name, size)
-        self._variables.append((name, symbol))
-        return symbol
+    def variable(self, name: str, size: int, quantity: str = "", place: int | None = None) -> SX:
+        """A local variable (size,), bound by its name to rows of the problem's variables.
 
-    def parameter(self, name: str, size: int = 1) -> SX:
-        """A local parameter (size,), bound to entries of the problem's parameters in the order of declaration."""
-        symbol = SX.sym(name, size)
-        self._parameters.append((name, symbol))
-        return symbol
+        Args:
+            name: unique in the kernel.
+            size: number of entries.
+            quantity: what it is; by default its name.
+            place: its rank, where the kernel reads several of one quantity.
+        """
+        return self._declare(self._variables, name, size, quantity, place)
+
+    def parameter(self, name: str, size: int = 1, quantity: str = "", place: int | None = None) -> SX:
+        """A local parameter (size,), bound by its name to entries of the problem's parameters; see `variable`."""
+        return self._declare(self._parameters, name, size, quantity, place)
+
+    def _declare(self, where: list[Local], name: str, size: int, quantity: str, place: int | None) -> SX:
+        if name in self.locals:
+            raise KeyError(f"kernel '{self.name}' already has a symbol '{name}'")
+        self.locals[name] = Local(name, SX.sym(name, size), quantity or name, place)
+        where.append(self.locals[name])
+        return self.locals[name].symbol
 
     def cost(self, name: str, residual: SX, form: Literal["square", "sum"] = "square") -> None:
         """Add a cost: the sum of squares of a residual, or the plain sum of non-negative values."""
@@ -41,28 +97,28 @@ class Kernel:
             raise KeyError(f"kernel '{self.name}' already has a term '{name}'")
         self.terms[name] = ca.sumsqr(residual) if form == "square" else ca.sum(residual)
 
-    def constrain(self, name: str, expression: SX) -> None:
+    def constrain(self, declared: Constraint, expression: SX) -> None:
         """Add a constraint (n,); its bounds are given when the kernel is bound."""
-        if name in self.constraints:
-            raise KeyError(f"kernel '{self.name}' already has a constraint '{name}'")
-        self.constraints[name] = expression
+        if declared.name in self.constraints:
+            raise KeyError(f"kernel '{self.name}' already has a constraint '{declared.name}'")
+        self.constraints[declared.name], self.declared[declared.name] = expression, declared
 
     @property
     def variables(self) -> SX:
-        """All local variables in one column."""
-        return ca.vertcat(*[symbol for _, symbol in self._variables])
+        """All local variables in one column, in the order of their declaration."""
+        return ca.vertcat(*[local.symbol for local in self._variables])
 
     @property
     def parameters(self) -> SX:
-        """All local parameters in one column."""
-        return ca.vertcat(*[symbol for _, symbol in self._parameters])
+        """All local parameters in one column, likewise."""
+        return ca.vertcat(*[local.symbol for local in self._parameters])
 
     @property
-    def variable_sizes(self) -> list[tuple[str, int]]:
-        """Name and size of each local variable."""
-        return [(name, symbol.numel()) for name, symbol in self._variables]
+    def local_variables(self) -> tuple[Local, ...]:
+        """The local variables, in the order of their declaration."""
+        return tuple(self._variables)
 
     @property
-    def parameter_sizes(self) -> list[tuple[str, int]]:
-        """Name and size of each local parameter."""
-        return [(name, symbol.numel()) for name, symbol in self._parameters]
+    def local_parameters(self) -> tuple[Local, ...]:
+        """The local parameters, likewise."""
+        return tuple(self._parameters)

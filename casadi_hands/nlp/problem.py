@@ -12,17 +12,11 @@ import scipy.sparse as sparse
 from casadi import MX, Function
 from numpy.typing import ArrayLike, NDArray
 
-from casadi_hands.nlp.assembly import (
-    Gathering,
-    KernelFunctions,
-    Reads,
-    kernel_functions,
-    scatter_hessian,
-    scatter_jacobian,
-    together,
-)
+from casadi_hands.nlp.arguments import Argument, arguments_by_name, check_arguments
+from casadi_hands.nlp.assembly import Gathering, Reads, scatter_hessian, scatter_jacobian, together
+from casadi_hands.nlp.derivatives import KernelFunctions, kernel_functions
 from casadi_hands.nlp.kernel import Kernel
-from casadi_hands.nlp.layout import Layout, Rows
+from casadi_hands.nlp.layout import Label, Layout, Parameter, Rows
 
 Vector = NDArray[np.float64]
 
@@ -78,45 +72,87 @@ class Problem:
         self.constraint_lower: Vector = np.empty(0)
         self.constraint_upper: Vector = np.empty(0)
         self._bound: list[_Bound] = []
+        self._given: dict[str, Parameter] = {}
 
     def variable(
-        self, name: str, shape: tuple[int, int], lower: ArrayLike = -np.inf, upper: ArrayLike = np.inf
+        self,
+        name: str,
+        shape: tuple[int, int],
+        lower: ArrayLike = -np.inf,
+        upper: ArrayLike = np.inf,
+        *,
+        quantity: str = "",
+        owner: int | None = None,
     ) -> Rows:
-        """A decision variable (K, d) with box bounds, broadcast to its shape."""
+        """A decision variable (K, d) with box bounds, broadcast to its shape.
+
+        Args:
+            name: unique in the problem.
+            shape: (K, d).
+            lower: bound.
+            upper: bound.
+            quantity: what it is, as kernels' symbols name it; by default its name.
+            owner: which of several alike it belongs to.
+        """
         indices = self.variables.add(name, shape)
         self.lower = np.append(self.lower, np.broadcast_to(np.asarray(lower, float), shape).reshape(-1))
         self.upper = np.append(self.upper, np.broadcast_to(np.asarray(upper, float), shape).reshape(-1))
-        return Rows.of(indices, self.variables.size)
+        return Rows.of(indices, self.variables.size, Label(quantity or name, owner))
 
-    def parameter(self, name: str, shape: tuple[int, int]) -> NDArray[np.int64]:
-        """A parameter (K, d); the positions returned are bound to kernels, row k to instance k."""
-        return self.parameters.add(name, shape)
+    def parameter(
+        self,
+        name: str,
+        shape: tuple[int, int],
+        *,
+        quantity: str = "",
+        owner: int | None = None,
+        when: float | None = None,
+    ) -> Parameter:
+        """A parameter (K, d), to be bound to kernels, row k to instance k; see `variable`."""
+        self._given[name] = Parameter(self.parameters.add(name, shape), Label(quantity or name, owner, when))
+        return self._given[name]
+
+    def given(self, *names: str) -> dict[str, Parameter]:
+        """Parameters by name, as `bind` takes them.
+
+        Raises:
+            KeyError: one that was not declared.
+        """
+        return {name: self._given[name] for name in names}
+
+    def __getitem__(self, name: str) -> Parameter:
+        """A parameter that was declared."""
+        return self._given[name]
 
     def bind(
         self,
         kernel: Kernel,
-        variables: Sequence[Rows],
-        parameters: Sequence[NDArray[np.int64]] = (),
         bounds: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
-        name: str = "",
+        block: str = "",
+        /,
+        **arguments: Argument | Sequence[Argument],
     ) -> None:
         """Evaluate a kernel once for each row of its arguments; with none, only its constraints' names are known.
 
+        Every symbol of the kernel is given by its name: a local variable the rows (K, d) it reads, a local parameter
+        positions (K, d), or (1, d) where all instances share it. ``name=(a, b, …)`` gives ``name0``, ``name1``, ….
+
         Args:
             kernel: the block.
-            variables: for each local variable the rows (K, d) it reads.
-            parameters: for each local parameter positions (K, d), or (1, d) where all instances share it.
             bounds: lower and upper bound of each constraint, broadcast to its length in every instance.
-            name: before the constraints' own names; by default the kernel's.
+            block: before the constraints' own names; by default the kernel's name.
+            arguments: by name.
 
         Raises:
-            ValueError: arguments that are not one for each of the kernel's symbols, or not of its size.
+            TypeError: an argument that is missing or unknown.
+            ValueError: one that is not of its symbol's size, or that is labelled as something else.
         """
-        count, sizes = variables[0].count, kernel.variable_sizes
-        _check_shapes(kernel.name, sizes, [(rows.count, rows.width) for rows in variables], (count,))
-        _check_shapes(kernel.name, kernel.parameter_sizes, [p.shape for p in parameters], (count, 1))
-        first = self.constraints.size
-        self._constrain(name or kernel.name, kernel, count, bounds or {})
+        given = arguments_by_name(kernel, arguments)
+        check_arguments(kernel, given)
+        variables = [rows for local in kernel.local_variables if isinstance(rows := given[local.name], Rows)]
+        parameters = [p.positions for local in kernel.local_parameters if isinstance(p := given[local.name], Parameter)]
+        count, first = variables[0].count, self.constraints.size
+        self._constrain(block or kernel.name, kernel, count, bounds or {})
         if not count:
             return
         rows = Rows.beside(variables)
@@ -239,14 +275,3 @@ def _inputs(bound: _Bound, read: MX, p: MX) -> tuple[MX, MX, MX]:
     parameters = ca.reshape(p[positions], -1, bound.count) if positions else MX.zeros(0, bound.count)
     weights = ca.repmat(p[bound.weights.tolist()], 1, bound.count) if bound.kernel.terms else MX.zeros(0, bound.count)
     return ca.reshape(ca.vec(read), -1, bound.count), parameters, weights
-
-
-def _check_shapes(
-    kernel: str, sizes: list[tuple[str, int]], shapes: Sequence[tuple[int, ...]], counts: tuple[int, ...]
-) -> None:
-    """Refuse arguments whose shapes are not (one of ``counts``, size), one for each name."""
-    if len(shapes) != len(sizes):
-        raise ValueError(f"{kernel}: {len(shapes)} given, expected {', '.join(name for name, _ in sizes) or 'none'}")
-    for (name, size), shape in zip(sizes, shapes, strict=True):
-        if shape not in [(count, size) for count in counts]:
-            raise ValueError(f"{kernel}.{name}: rows {shape}, expected ({counts[0]}, {size})")

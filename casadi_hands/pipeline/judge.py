@@ -9,9 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from casadi_hands.design import Design, Hand, Motion
-from casadi_hands.export.folder import save_design
-from casadi_hands.pipeline.words import (
+from casadi_hands.diagnosis.figures import (
     GRASP_ADVICE,
     friction_reason,
     missed_figures,
@@ -19,9 +17,13 @@ from casadi_hands.pipeline.words import (
     speed_reason,
     torque_reason,
 )
-from casadi_hands.reasons import Reason, tell
-from casadi_hands.stages.floating import Floating
-from casadi_hands.stages.model import Model
+from casadi_hands.diagnosis.reason import Reason, tell
+from casadi_hands.export.design import Design
+from casadi_hands.export.folder import save_design
+from casadi_hands.problem.floating_motion import Floating
+from casadi_hands.problem.hand import Hand
+from casadi_hands.problem.model import Model
+from casadi_hands.problem.motion import Motion
 from casadi_hands.verify import audit_files, run_replays
 from casadi_hands.verify.report import Audit
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from casadi_hands.design import Design
+from casadi_hands.export.design import Design
 from casadi_hands.nlp import Solution
 from casadi_hands.task import Task
 

@@ -12,17 +12,19 @@ from pathlib import Path
 
 import numpy as np
 
-from casadi_hands.design import Design
+from casadi_hands.diagnosis.shortcoming import shortcoming_reason
 from casadi_hands.errors import SolveError
-from casadi_hands.pipeline.certify import Certifier, Refiner
+from casadi_hands.execution.processes import processes, start_up
+from casadi_hands.export.design import Design
+from casadi_hands.pipeline.certify import Certifier
 from casadi_hands.pipeline.judge import Judge
 from casadi_hands.pipeline.record import STAGES, Progress, Record
+from casadi_hands.pipeline.refiner import Refiner
 from casadi_hands.pipeline.steps import adopt, prepare_search, run_floating, run_search, run_whole_hand
-from casadi_hands.pipeline.warm import as_floating, kept_margin, warm_start
-from casadi_hands.search.work import processes, start_up
-from casadi_hands.stages.model import build_model
+from casadi_hands.pipeline.warm_start import as_floating, kept_margin, warm_start
+from casadi_hands.problem.si import build_model
 from casadi_hands.task import Task
-from casadi_hands.verify.simulation import load_mujoco
+from casadi_hands.verify.replays.simulation import load_mujoco
 
 _LOG = logging.getLogger(__name__)
 # What numbers may do from one start and not from another; CasADi raises RuntimeError.
@@ -117,7 +119,7 @@ def _run(record: Record, until: str, executor: Executor | None, jobs: int) -> De
     judge = Judge(model, floating)
     if until == "whole_hand":
         run_whole_hand(record, model, floating, found.candidates[0])
-        judged = judge.judge(record.design, found.short)
+        judged = judge.judge(record.design, [shortcoming_reason(model, short) for short in found.short])
         return judge.replayed(judged, jobs) if judged.status == "certified" else judged
     return judge.concluded(Certifier(record, model, floating, search, judge, jobs).run(found), jobs)
 

@@ -7,12 +7,15 @@ from concurrent.futures import Executor
 
 from casadi_hands.export.commands import commanded
 from casadi_hands.pipeline.record import Record
-from casadi_hands.search.algorithm import Candidate, Found, Search, run_record
-from casadi_hands.stages.floating import Floating, FloatingStage, solve_floating
-from casadi_hands.stages.model import Model
-from casadi_hands.stages.outcome import floating_motion, hand_of, joint_loads, whole_hand_motion
-from casadi_hands.stages.target import target_of
-from casadi_hands.stages.whole_hand import WholeHand, WholeHandStage
+from casadi_hands.problem.floating_motion import Floating
+from casadi_hands.problem.hand_motion import WholeHand
+from casadi_hands.problem.model import Model
+from casadi_hands.problem.outcome import floating_motion, whole_hand_motion
+from casadi_hands.problem.si import hand_of, joint_loads
+from casadi_hands.stages.floating.stage import FloatingStage, solve_floating
+from casadi_hands.stages.synthesis.algorithm import Candidate, Found, Search, run_record
+from casadi_hands.stages.synthesis.target import target_of
+from casadi_hands.stages.whole_hand.stage import WholeHandStage
 
 
 def run_floating(record: Record, model: Model) -> Floating:

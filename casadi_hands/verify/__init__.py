@@ -1,9 +1,9 @@
 """The witness: recompute a finished design from its files, sharing no formula with the optimiser."""
 
 from casadi_hands.verify.audit import audit, audit_files
-from casadi_hands.verify.perturb import Perturbation
-from casadi_hands.verify.replay import Replay, replay, replay_many
-from casadi_hands.verify.replays import REPLAYS, Replays, run_replays
+from casadi_hands.verify.replays.perturb import Perturbation
+from casadi_hands.verify.replays.replay import Replay, replay, replay_many
+from casadi_hands.verify.replays.series import REPLAYS, Replays, run_replays
 from casadi_hands.verify.report import Audit, Figure
 
 __all__ = [

@@ -12,25 +12,25 @@ from pathlib import Path
 import numpy as np
 
 from casadi_hands.task import load_task
-from casadi_hands.verify.certificate import certificate_problems
-from casadi_hands.verify.clearance import joint_figures, penetration_figure
-from casadi_hands.verify.contact import (
+from casadi_hands.verify.checks.certificate import certificate_problems
+from casadi_hands.verify.checks.structure import structure_problems
+from casadi_hands.verify.checks.trust import limit_notes
+from casadi_hands.verify.figures.clearance import joint_figures, penetration_figure
+from casadi_hands.verify.figures.contact import (
     friction_figures,
     gap_at_samples,
     gap_between_samples,
     slip_figure,
     spin_figure,
 )
-from casadi_hands.verify.disturbances import disturbed_figures
-from casadi_hands.verify.dynamics import Shots, between_residual, sample_residual, shoot
-from casadi_hands.verify.folder import Folder, read_folder
-from casadi_hands.verify.goals import goal_figures, rest_figure
-from casadi_hands.verify.replays import REPLAYS, run_replays
+from casadi_hands.verify.figures.disturbances import disturbed_figures
+from casadi_hands.verify.figures.dynamics import Shots, between_residual, sample_residual, shoot
+from casadi_hands.verify.figures.goals import goal_figures, rest_figure
+from casadi_hands.verify.figures.wrench import disturbance_figure, torque_figure, unsupplied_figure
+from casadi_hands.verify.reading.folder import Folder, read_folder
+from casadi_hands.verify.replays.series import REPLAYS, run_replays
 from casadi_hands.verify.report import Audit, Figure
-from casadi_hands.verify.structure import structure_problems
 from casadi_hands.verify.trajectory import build_trajectory, sample_placements
-from casadi_hands.verify.trust import limit_notes
-from casadi_hands.verify.wrench import disturbance_figure, torque_figure, unsupplied_figure
 
 
 def audit(directory: str | Path, *, task: str | Path | None = None, replays: int = REPLAYS, jobs: int = 1) -> Audit:

@@ -17,8 +17,8 @@ import pinocchio as pin
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from casadi_hands.verify.dynamics import Shots, end_speeds, object_rotation, still
-from casadi_hands.verify.folder import Folder
+from casadi_hands.verify.figures.dynamics import Shots, end_speeds, object_rotation, still
+from casadi_hands.verify.reading.folder import Folder
 
 DENSITY = 8
 """Dense times from a sample to the next: 12.5 ms apart at 0.1 s."""

@@ -17,16 +17,16 @@ import pytest
 from typer.testing import CliRunner
 
 import casadi_hands
-from casadi_hands.alternatives import Alternative
 from casadi_hands.cli import main
 from casadi_hands.cli.app import Stage, app
-from casadi_hands.design import Design
+from casadi_hands.export.design import Design
 from casadi_hands.export.mjcf import scene_mjcf
+from casadi_hands.pipeline.alternatives import Alternative
 from casadi_hands.task import load_task
 from casadi_hands.verify import Perturbation, Replay, Replays
-from casadi_hands.verify.replay import GoalError
-from tests.alternatives.example import certified, shifted, without_hand
+from casadi_hands.verify.replays.replay import GoalError
 from tests.export.example import TASK, example_design, example_task
+from tests.pipeline.alternatives.example import certified, shifted, without_hand
 from tests.verify.fixture import Scene, carried
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
@@ -274,7 +274,7 @@ def test_several_seeds_are_listed_best_first(task_file: Path, monkeypatch: pytes
         designs[seed].save(out)
         return designs[seed]
 
-    monkeypatch.setattr("casadi_hands.alternatives.seeds.solve", solve)
+    monkeypatch.setattr("casadi_hands.pipeline.alternatives.seeds.solve", solve)
     found = run("solve", task_file, "--seed", 4, "--seeds", 4, "--out", tmp_path / "out")
     assert (found.exit_code, seeds) == (0, [4, 5, 6, 7])
     text = " ".join(found.stdout.split())
@@ -296,7 +296,7 @@ def test_seeds_begin_with_the_tasks(task_file: Path, monkeypatch: pytest.MonkeyP
         asked.append((list(seeds), settings["jobs"], settings["until"], settings["out"]))
         return [Alternative(9, replace(example_design(), status="failed"), kept=False)]
 
-    monkeypatch.setattr("casadi_hands.alternatives.explore", explore)
+    monkeypatch.setattr("casadi_hands.pipeline.alternatives.explore", explore)
     task_file.write_text(TASK + "search: {seed: 9}\n")
     found = run("solve", task_file, "--seeds", 3, "--jobs", 2, "--until", "whole_hand", "--out", tmp_path)
     assert asked == [([9, 10, 11], 2, "whole_hand", tmp_path)]

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from casadi_hands.design import Design, Finger, Hand, Link, Motion
+from casadi_hands.export.design import Design
+from casadi_hands.problem.hand import Finger, Hand, Link
+from casadi_hands.problem.motion import Motion
 from casadi_hands.task import Task, parse_task
 
 TASK = """

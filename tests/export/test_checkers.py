@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from casadi_hands.design import Design
+from casadi_hands.export.design import Design
 from casadi_hands.export.folder import save_design
 from tests.export.example import example_design, example_motion
 

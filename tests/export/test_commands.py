@@ -9,10 +9,10 @@ import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation
 
-from casadi_hands.design import Motion
 from casadi_hands.export.commands import commanded, joint_torques, joint_velocities
 from casadi_hands.export.mjcf import scene_mjcf
 from casadi_hands.export.urdf import hand_urdf
+from casadi_hands.problem.motion import Motion
 from tests.export.example import example_hand, example_motion, example_task
 from tests.export.test_urdf import odd_hand
 

@@ -15,10 +15,10 @@ import yourdfpy
 from rosbags.typesys import Stores, get_typestore
 from scipy.interpolate import CubicHermiteSpline
 
-from casadi_hands.design import Design
-from casadi_hands.export.motors import joint_motors
+from casadi_hands.export.design import Design
 from casadi_hands.export.targets import export_design
 from casadi_hands.export.targets.ros2 import package_name
+from casadi_hands.problem.motors import joint_motors
 from tests.export.example import example_design, example_motion
 
 STORE = get_typestore(Stores.ROS2_HUMBLE)

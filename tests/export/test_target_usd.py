@@ -7,11 +7,11 @@ import pytest
 from pxr import Usd, UsdGeom, UsdPhysics, UsdShade
 from scipy.spatial.transform import Rotation
 
-from casadi_hands.design import Design
 from casadi_hands.errors import HandsError
-from casadi_hands.export.inertia import link_inertial, palm_inertial
-from casadi_hands.export.motors import joint_motors
+from casadi_hands.export.design import Design
 from casadi_hands.export.targets import export_design
+from casadi_hands.problem.inertia import link_inertial, palm_inertial
+from casadi_hands.problem.motors import joint_motors
 from tests.export.example import example_design
 
 

@@ -8,11 +8,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from casadi_hands.design import Design, Motion
 from casadi_hands.errors import DesignError, HandsError
 from casadi_hands.export.arrays import save_motion
+from casadi_hands.export.design import Design
 from casadi_hands.export.table import motion_table
 from casadi_hands.export.targets import TARGETS, export_design
+from casadi_hands.problem.motion import Motion
 from tests.export.example import example_design, example_motion
 
 

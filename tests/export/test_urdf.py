@@ -11,9 +11,9 @@ import pytest
 import yourdfpy
 from scipy.spatial.transform import Rotation
 
-from casadi_hands.design import Finger, Hand, Link
 from casadi_hands.errors import DesignError
 from casadi_hands.export.urdf import hand_urdf, object_urdf
+from casadi_hands.problem.hand import Finger, Hand, Link
 from casadi_hands.task import parse_task
 from tests.export.example import LINK_RADIUS, example_hand, example_motion, example_task
 

@@ -19,11 +19,11 @@ import numpy as np
 import pytest
 from casadi import SX, Function
 
-from casadi_hands.nlp import Kernel, assembly, machine_code
-from casadi_hands.nlp.assembly import kernel_functions
+from casadi_hands.nlp import Kernel, derivatives, machine_code
+from casadi_hands.nlp.derivatives import kernel_functions
 from casadi_hands.nlp.machine_code import cache_folder, compiler
-from casadi_hands.stages import exact_fingers
-from casadi_hands.stages.soft_object import dynamics
+from casadi_hands.stages.object_motion.kernels import dynamics
+from casadi_hands.stages.refine import finger_kernels
 
 Array = np.ndarray
 ROOT = Path(__file__).parents[2]
@@ -108,9 +108,9 @@ def suffixes(cache: Path) -> list[str]:
 def kernels() -> list[Kernel]:
     return [
         dynamics(2),
-        exact_fingers.contact(2, True),
-        exact_fingers.rolling(1),
-        exact_fingers.fingers_apart(1, 2),
+        finger_kernels.contact(2, True),
+        finger_kernels.rolling(1),
+        finger_kernels.fingers_apart(1, 2),
     ]
 
 
@@ -118,16 +118,16 @@ def kernels() -> list[Kernel]:
 def test_machine_code_gives_the_very_numbers_of_the_interpreter(
     kernel: Kernel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("casadi_hands.nlp.assembly._known", {})
+    monkeypatch.setattr("casadi_hands.nlp.derivatives._known", {})
     (fast,) = kernel_functions([kernel])
     assert all(each is fast for each in kernel_functions([kernel, kernel]))
-    monkeypatch.setattr("casadi_hands.nlp.assembly._known", {})
-    assembly._symbols.cache_clear()
+    monkeypatch.setattr("casadi_hands.nlp.derivatives._known", {})
+    derivatives._symbols.cache_clear()
     with monkeypatch.context() as patch:
-        patch.setattr(assembly._Symbols, "differentiated", refuse)
+        patch.setattr(derivatives._Symbols, "differentiated", refuse)
         (kept,) = kernel_functions([kernel])
     monkeypatch.setattr("casadi_hands.nlp.machine_code.compiler", lambda: None)
-    monkeypatch.setattr("casadi_hands.nlp.assembly._known", {})
+    monkeypatch.setattr("casadi_hands.nlp.derivatives._known", {})
     (slow,) = kernel_functions([kernel])
     for pattern in ("jacobian_pattern", "hessian_pattern"):
         assert getattr(fast, pattern) == getattr(kept, pattern) == getattr(slow, pattern)
@@ -207,10 +207,10 @@ def test_an_interrupt_starts_no_further_compilers(counting: Compiler, monkeypatc
 
 
 def test_kernels_differentiated_otherwise_have_another_revision() -> None:
-    how = inspect.getsource(assembly._Symbols.differentiated) + inspect.getsource(assembly._nonzeros)
+    how = inspect.getsource(derivatives._Symbols.differentiated) + inspect.getsource(derivatives._nonzeros)
     digest = hashlib.sha256(how.encode()).hexdigest()[:16]
-    assert (assembly._REVISION, digest) == ("1", "28c47e2ee9eecb29"), (
-        "count assembly._REVISION up: libraries are kept by it"
+    assert (derivatives._REVISION, digest) == ("1", "28c47e2ee9eecb29"), (
+        "count derivatives._REVISION up: libraries are kept by it"
     )
 
 

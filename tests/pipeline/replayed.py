@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from casadi_hands.design import Design
+from casadi_hands.export.design import Design
 
 OF = 12
 

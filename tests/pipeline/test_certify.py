@@ -10,19 +10,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from casadi_hands.design import Design
+from casadi_hands.export.design import Design
 from casadi_hands.pipeline import certify
-from casadi_hands.pipeline.certify import AMPLE, FIRM, Certifier, Refiner, intervals_to_halve
+from casadi_hands.pipeline import refiner as refiner_module
+from casadi_hands.pipeline.certify import Certifier
 from casadi_hands.pipeline.record import Record
-from casadi_hands.search.algorithm import Candidate, Found
-from casadi_hands.stages.model import build_model
-from casadi_hands.stages.refine import Run, Worst
-from casadi_hands.stages.refine_values import Margin
+from casadi_hands.pipeline.refiner import AMPLE, FIRM, Refiner, intervals_to_halve
+from casadi_hands.problem.si import build_model
+from casadi_hands.stages.refine.result import Run, Worst
+from casadi_hands.stages.refine.values import Margin
+from casadi_hands.stages.synthesis.algorithm import Candidate, Found
 from casadi_hands.task import parse_task
 from casadi_hands.verify.report import Audit, Figure
 from tests.pipeline.replayed import replayed
-from tests.search.example import ball_target, ball_task, hand, pointing
 from tests.stages.example import made_up_solution
+from tests.stages.synthesis.example import ball_target, ball_task, hand, pointing
 
 Verdict = tuple[int, str, bool]  # limits missed, the constraint that was worst, whether it slips hopelessly
 
@@ -169,7 +171,7 @@ def test_what_a_firmer_grip_changes_is_told_from_the_hand_before_any_refinement(
         return SimpleNamespace(hand=firm, runs=(other, Run("exact", solution, FIRM), other))
 
     told: Any = {}
-    monkeypatch.setattr(certify, "design_change", lambda _, before, after: {"from": before, "to": after})
+    monkeypatch.setattr(refiner_module, "design_change", lambda _, before, after: {"from": before, "to": after})
     record = Record(ball_task(), None, lambda _: None)
     Refiner(record, told, told, 1)._attempt(whole, FIRM, partial(solve, exact, near=True))  # type: ignore[arg-type]
     assert asked == [(exact, FIRM, True)]
@@ -219,12 +221,12 @@ def test_what_is_missed_only_between_samples_gets_more_of_them(
         parts = np.zeros(len(tried[-1]) - 1)
         parts[0] = 4.0 / len(tried)
         parts = parts if missed != "slip" else parts[None]
-        kept = {name: Figure(name, 0.0, 1.0, "m", "") for name in certify.BETWEEN}
+        kept = {name: Figure(name, 0.0, 1.0, "m", "") for name in refiner_module.BETWEEN}
         return SimpleNamespace(figures={**kept, missed: Figure(missed, parts.sum(), 1.0, "m", "", by_interval=parts)})
 
-    monkeypatch.setattr(certify, "Continuation", Once)
+    monkeypatch.setattr(refiner_module, "Continuation", Once)
     monkeypatch.setattr(Refiner, "_regripped", lambda *_: SimpleNamespace(exact=False))  # no grip is any better
-    monkeypatch.setattr(certify, "resampled", lambda hand, before, after: hand)
+    monkeypatch.setattr(refiner_module, "resampled", lambda hand, before, after: hand)
     monkeypatch.setattr(Refiner, "_attempt", lambda self, whole, margin, way: way(margin=margin))
     monkeypatch.setattr(Refiner, "_judged", judged)
     monkeypatch.setattr(Refiner, "_replayed", lambda self, design: design)
@@ -271,7 +273,7 @@ def refine(
 ) -> tuple[Margin, int]:
     """The margin of what is kept and its drops, where designs and drops are judged as told, in this order."""
     judged, dropped = iter(statuses), iter(drops)
-    monkeypatch.setattr(certify, "Continuation", lambda *_: ways)
+    monkeypatch.setattr(refiner_module, "Continuation", lambda *_: ways)
     monkeypatch.setattr(Refiner, "_attempt", lambda self, whole, margin, way: way(margin=margin))
     monkeypatch.setattr(Refiner, "_judged", lambda self, *_: replace(self.record.design, status=next(judged)))
 
@@ -341,7 +343,7 @@ def test_where_fingers_pass_through_each_other_no_other_grip_is_tried(monkeypatc
 
 
 def test_intervals_that_use_up_a_limit_and_their_neighbours_are_halved() -> None:
-    figures = {name: Figure(name, 0.0, 1.0, "m", "", by_interval=np.zeros(8)) for name in certify.BETWEEN}
+    figures = {name: Figure(name, 0.0, 1.0, "m", "", by_interval=np.zeros(8)) for name in refiner_module.BETWEEN}
     lengths = np.full(8, 0.1)
 
     def marked(name: str, *parts: list[float]) -> list[int]:

@@ -7,7 +7,7 @@ import pytest
 from casadi_hands.pipeline import judge
 from casadi_hands.pipeline.judge import Judge
 from casadi_hands.verify.report import Audit, Figure
-from tests.pipeline.test_holding import still, upright
+from tests.diagnosis.test_holding import still, upright
 
 SLIPS = Figure("slip", 0.003, 0.0002, "m", "contact 'left' slips {value}")
 

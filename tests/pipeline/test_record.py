@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from casadi_hands.design import Design
+from casadi_hands.export.design import Design
 from casadi_hands.pipeline.record import Progress, Record
 from tests.pipeline.replayed import replayed
-from tests.search.example import ball_task
 from tests.stages.example import made_up_solution
+from tests.stages.synthesis.example import ball_task
 
 
 def record(news: list[Progress], out: Path | None = None) -> Record:

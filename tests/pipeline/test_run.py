@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from casadi_hands.design import Design
 from casadi_hands.errors import DesignError, SolveError
+from casadi_hands.export.design import Design
 from casadi_hands.pipeline import Progress, run, solve
-from casadi_hands.pipeline.certify import FIRM, Refiner
 from casadi_hands.pipeline.record import Record
+from casadi_hands.pipeline.refiner import FIRM, Refiner
 from casadi_hands.task import parse_task
 from tests.pipeline.replayed import replayed
-from tests.pipeline.test_warm import HELD, earlier, edited, pressing
+from tests.pipeline.test_warm_start import HELD, earlier, edited, pressing
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import pretended_solves
 import pytest
 from shared import is_kept, with_seed
 
-from casadi_hands.design import Design
+from casadi_hands.export.design import Design
 from tests.export.example import example_task
 
 TASK = example_task()

@@ -19,9 +19,9 @@ from peers import Attempt, Run, recorded_solves
 from profiled import KINDS, Ledger, processor_time
 
 from casadi_hands import load_task
-from casadi_hands.nlp.assembly import kernel_functions
-from casadi_hands.stages.floating import FloatingStage
-from casadi_hands.stages.model import build_model
+from casadi_hands.nlp.derivatives import kernel_functions
+from casadi_hands.problem.si import build_model
+from casadi_hands.stages.floating.stage import FloatingStage
 
 TASK = Path(__file__).parents[2] / "problems" / "horizontal_translation.yaml"
 NAP = 60  # s

@@ -10,7 +10,7 @@ from shared import NOTHING
 from soft_figures import HEAD, main, planned_slips
 
 from casadi_hands import load_task, solve
-from casadi_hands.verify.folder import read_folder
+from casadi_hands.verify.reading.folder import read_folder
 from casadi_hands.verify.trajectory import sample_placements
 from tests.export.example import TASK
 from tests.verify.fixture import TIP, geared

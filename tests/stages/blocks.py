@@ -9,8 +9,8 @@ import coal
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from casadi_hands.kinematics.morphology import FingerSeed
 from casadi_hands.nlp import Kernel
-from casadi_hands.stages.synthesis import FingerSeed
 from tests.stages.example import nearest_on_axis
 
 Array = np.ndarray
@@ -22,9 +22,9 @@ STILL = [1.0, 0.0, 0.0, 0.0]
 def packed(kernel: Kernel, variables: Values, parameters: Values) -> list[Array]:
     """Variables and parameters given by name in the order of declaration, each in one column."""
     columns = []
-    for sizes, values in ((kernel.variable_sizes, variables), (kernel.parameter_sizes, parameters)):
-        assert sizes == [(name, np.size(value)) for name, value in values.items()]
-        columns.append(np.concatenate([np.zeros(0), *[np.ravel(value) for value in values.values()]]))
+    for symbols, values in ((kernel.local_variables, variables), (kernel.local_parameters, parameters)):
+        assert {local.name: local.size for local in symbols} == {name: np.size(v) for name, v in values.items()}
+        columns.append(np.concatenate([np.zeros(0), *[np.ravel(values[local.name]) for local in symbols]]))
     return columns
 
 

@@ -11,10 +11,11 @@ import pinocchio as pin
 from scipy.interpolate import BPoly, CubicHermiteSpline
 from scipy.spatial.transform import Rotation, Slerp
 
+from casadi_hands.kinematics.morphology import FingerSeed
 from casadi_hands.nlp import Solution, Solver
-from casadi_hands.stages.floating import Floating
-from casadi_hands.stages.model import Model, build_model
-from casadi_hands.stages.synthesis import FingerSeed
+from casadi_hands.problem.floating_motion import Floating
+from casadi_hands.problem.model import Model
+from casadi_hands.problem.si import build_model
 from casadi_hands.task import Task, parse_task
 
 Array = np.ndarray
@@ -91,7 +92,7 @@ def made_up_values(model: Model, seed: int = 0) -> dict[str, Array]:
         "point": (patches + 0.1 * rng.normal(size=(keyframes, contacts, 3))).reshape(keyframes, -1),
         "force": rng.normal(size=(samples, 3 * contacts)),
         "activity": rng.uniform(0.1, 0.9, (keyframes, contacts)),
-        **({"force_perturbed": rng.normal(size=(samples, 3 * contacts))} if model.perturbed else {}),
+        **({"force_perturbed": rng.normal(size=(samples, 3 * contacts))} if model.disturbed else {}),
     }
 
 

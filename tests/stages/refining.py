@@ -7,10 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from casadi_hands.stages.model import Model
-from casadi_hands.stages.refine import RefineStage
-from casadi_hands.stages.refine_values import Margin
-from casadi_hands.stages.whole_hand import WholeHand
+from casadi_hands.problem.hand_motion import WholeHand
+from casadi_hands.problem.model import Model
+from casadi_hands.stages.refine.stage import RefineStage
+from casadi_hands.stages.refine.values import Margin
 from tests.stages.example import drawing, everything, made_up_finger, made_up_solution, project
 
 Array = np.ndarray

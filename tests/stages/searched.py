@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from casadi_hands.search.algorithm import Search
-from casadi_hands.stages.floating import Floating
-from casadi_hands.stages.model import Model
-from casadi_hands.stages.target import target_of
-from casadi_hands.stages.whole_hand import WholeHand, WholeHandStage
+from casadi_hands.problem.floating_motion import Floating
+from casadi_hands.problem.hand_motion import WholeHand
+from casadi_hands.problem.model import Model
+from casadi_hands.stages.synthesis.algorithm import Search
+from casadi_hands.stages.synthesis.target import target_of
+from casadi_hands.stages.whole_hand.stage import WholeHandStage
 from casadi_hands.task import Task
 
 

@@ -13,9 +13,10 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from casadi_hands.design import Finger, Hand, Link, Motion
 from casadi_hands.export.commands import commanded
 from casadi_hands.export.mjcf import scene_mjcf
+from casadi_hands.problem.hand import Finger, Hand, Link
+from casadi_hands.problem.motion import Motion
 from casadi_hands.task import Task, load_task, task_to_yaml
 
 

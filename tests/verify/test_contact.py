@@ -9,7 +9,7 @@ import pytest
 from fixture import SPHERE, TIP, geared, plain, read_task
 from scipy.spatial.transform import Rotation
 
-from casadi_hands.verify.contact import (
+from casadi_hands.verify.figures.contact import (
     active_runs,
     friction_figures,
     gap_at_samples,
@@ -17,8 +17,8 @@ from casadi_hands.verify.contact import (
     slip_figure,
     spin_figure,
 )
-from casadi_hands.verify.dynamics import shoot
-from casadi_hands.verify.folder import Folder, read_folder
+from casadi_hands.verify.figures.dynamics import shoot
+from casadi_hands.verify.reading.folder import Folder, read_folder
 from casadi_hands.verify.trajectory import build_trajectory, sample_placements
 
 TIME = np.linspace(0.0, 1.0, 11)

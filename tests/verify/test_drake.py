@@ -22,10 +22,10 @@ from casadi_hands.errors import DesignError, HandsError
 from casadi_hands.export.urdf import hand_urdf
 from casadi_hands.task import Ground
 from casadi_hands.verify import Perturbation, replay
-from casadi_hands.verify.drake import DrakeSimulation, load_drake
-from casadi_hands.verify.drake_scene import PATCH, PRESS
-from casadi_hands.verify.folder import Folder, read_folder
-from casadi_hands.verify.simulation import Plan
+from casadi_hands.verify.reading.folder import Folder, read_folder
+from casadi_hands.verify.replays.drake import DrakeSimulation, load_drake
+from casadi_hands.verify.replays.drake_scene import PATCH, PRESS
+from casadi_hands.verify.replays.simulation import Plan
 
 WEIGHT, FLOOR, GROUND_FRICTION = MASS * 9.81, -1.0, 0.3
 LYING = (np.pi / 2, 0.0, 0.0)
@@ -352,7 +352,7 @@ def _without(monkeypatch: pytest.MonkeyPatch, error: Callable[[str], Exception])
 
     for name in [name for name in sys.modules if name.partition(".")[0] == "pydrake"]:
         monkeypatch.setitem(sys.modules, name, None)
-    monkeypatch.setattr("casadi_hands.verify.drake_scene.import_module", refuse)
+    monkeypatch.setattr("casadi_hands.verify.replays.drake_scene.import_module", refuse)
 
 
 def test_drake_that_is_missing_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -33,9 +33,9 @@ from scipy.spatial.transform import Rotation
 from casadi_hands.errors import DesignError, TaskError
 from casadi_hands.export.table import motion_table
 from casadi_hands.verify.audit import audit, audit_files
-from casadi_hands.verify.dynamics import shoot
-from casadi_hands.verify.folder import read_folder
-from casadi_hands.verify.structure import structure_problems
+from casadi_hands.verify.checks.structure import structure_problems
+from casadi_hands.verify.figures.dynamics import shoot
+from casadi_hands.verify.reading.folder import read_folder
 from casadi_hands.verify.trajectory import build_trajectory
 
 MORE = """

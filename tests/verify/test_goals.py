@@ -9,8 +9,8 @@ import pytest
 from fixture import SPHERE, plain, read_task
 from scipy.spatial.transform import Rotation
 
-from casadi_hands.verify.folder import read_folder
-from casadi_hands.verify.goals import goal_figures
+from casadi_hands.verify.figures.goals import goal_figures
+from casadi_hands.verify.reading.folder import read_folder
 
 TIME = np.linspace(0.0, 1.0, 11)
 

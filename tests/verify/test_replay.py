@@ -16,9 +16,9 @@ from scipy.spatial.transform import Rotation
 from casadi_hands.errors import DesignError, HandsError
 from casadi_hands.export.mjcf import scene_mjcf
 from casadi_hands.verify import Perturbation, audit_files, replay, replay_many
-from casadi_hands.verify.folder import read_folder
-from casadi_hands.verify.perturb import draw_perturbation
-from casadi_hands.verify.simulation import SUPPORT, Simulation, load_mujoco
+from casadi_hands.verify.reading.folder import read_folder
+from casadi_hands.verify.replays.perturb import draw_perturbation
+from casadi_hands.verify.replays.simulation import SUPPORT, Simulation, load_mujoco
 
 
 def _write(scene: Scene, directory: Path) -> Path:
@@ -133,7 +133,7 @@ def test_without_mujoco_the_message_says_what_to_install(folder: Path, monkeypat
 
 
 def test_without_imageio_the_message_says_what_to_install(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from casadi_hands.verify.video import film
+    from casadi_hands.verify.replays.video import film
 
     monkeypatch.setitem(sys.modules, "imageio", None)
     with pytest.raises(HandsError, match="imageio"):

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from casadi_hands.verify import Perturbation, Replay, Replays
-from casadi_hands.verify.replay import GoalError
+from casadi_hands.verify.replays.replay import GoalError
 from tests.export.example import example_task
 
 TASK = example_task()  # three goals, half an extent of 60 mm: 3 mm and 5 degrees are allowed

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from casadi_hands.verify.robot import read_robot
+from casadi_hands.verify.reading.robot import read_robot
 
 SPHERE = '<collision><origin xyz="{} {} 0"/><geometry><sphere radius="0.01"/></geometry></collision>'
 CYLINDER = (

@@ -16,7 +16,7 @@ from fixture import carried
 
 from casadi_hands.errors import HandsError
 from casadi_hands.export.mjcf import scene_mjcf
-from casadi_hands.verify.video import FRAMES, SIZE, film
+from casadi_hands.verify.replays.video import FRAMES, SIZE, film
 
 ROOT = Path(__file__).parents[2]
 PROGRAM = """
@@ -24,7 +24,7 @@ import sys
 from types import SimpleNamespace
 from casadi_hands.errors import HandsError
 from casadi_hands.verify import replay
-from casadi_hands.verify.video import film
+from casadi_hands.verify.replays.video import film
 sys.modules["imageio"] = SimpleNamespace()
 for play in (replay, lambda folder: film(folder, "film.gif")):
     try:

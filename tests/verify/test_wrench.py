@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from fixture import SPHERE, carried, plain, read_task
 
-from casadi_hands.verify.folder import Folder, read_folder
-from casadi_hands.verify.trajectory import place_links, sample_placements
-from casadi_hands.verify.wrench import (
+from casadi_hands.verify.figures.wrench import (
     disturbance_figure,
     disturbance_radius,
     planned_torques,
     torque_figure,
     unsupplied_figure,
 )
+from casadi_hands.verify.reading.folder import Folder, read_folder
+from casadi_hands.verify.trajectory import place_links, sample_placements
 
 TIME = np.linspace(0.0, 1.0, 11)
 
@@ -90,7 +90,7 @@ def test_no_sampled_push_inside_the_radius_is_beyond_the_grasp(held: Folder) -> 
     """A linear program finds friction-feasible forces for wrenches just inside the radius, and misses some beyond."""
     from scipy.optimize import linprog
 
-    from casadi_hands.verify.wrench import RESERVE, _cones, surface_normals
+    from casadi_hands.verify.figures.wrench import RESERVE, _cones, surface_normals
 
     placed = sample_placements(held)
     figure = disturbance_figure(held, placed)

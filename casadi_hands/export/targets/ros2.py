@@ -28,10 +28,10 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from scipy.interpolate import PchipInterpolator
 
 from casadi_hands.export.markup import document, number
-from casadi_hands.export.motors import Motor, joint_motors
 from casadi_hands.export.table import motion_table
 from casadi_hands.export.targets import ros2_texts
 from casadi_hands.export.targets.source import Source, write_texts
+from casadi_hands.problem.motors import Motor, joint_motors
 
 _APPROACH_SHARE = 0.5  # of the joints' speed limit, on the mean, from zero angles to the start
 _SHORTEST_APPROACH = 1.0  # s

@@ -7,8 +7,8 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from casadi_hands.export.motors import Motor
 from casadi_hands.export.targets.source import Source
+from casadi_hands.problem.motors import Motor
 
 _DEPENDENCIES = (
     "controller_manager",

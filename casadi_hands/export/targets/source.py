@@ -7,9 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from casadi_hands.design import Design, Hand, Motion
 from casadi_hands.errors import DesignError, HandsError
+from casadi_hands.export.design import Design
 from casadi_hands.export.urdf import hand_urdf
+from casadi_hands.problem.hand import Hand
+from casadi_hands.problem.motion import Motion
 from casadi_hands.task import Task
 
 _COMMANDS = ("joint_velocities", "joint_torques", "joint_commands")

@@ -21,9 +21,9 @@ from scipy.spatial.transform import Rotation
 
 from casadi_hands.errors import HandsError
 from casadi_hands.export.markup import document
-from casadi_hands.export.motors import Motor, joint_motors
 from casadi_hands.export.targets.source import Source, write_texts
 from casadi_hands.export.urdf import object_urdf
+from casadi_hands.problem.motors import Motor, joint_motors
 
 _MODULES = ("Gf", "Sdf", "Usd", "UsdGeom", "UsdPhysics", "UsdShade")
 _COMMENT = "made by casadi-hands"

@@ -1,7 +1,0 @@
-"""Several hands for one task: solved from several seeds, ranked, and the best distinct ones kept."""
-
-from casadi_hands.alternatives.folder import remove_alternatives, seed_folder
-from casadi_hands.alternatives.ranking import Alternative
-from casadi_hands.alternatives.seeds import explore
-
-__all__ = ["Alternative", "explore", "remove_alternatives", "seed_folder"]

@@ -1,0 +1,1 @@
+"""Why something failed: findings, and the sentences that tell them."""

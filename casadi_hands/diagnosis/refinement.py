@@ -1,0 +1,63 @@
+"""What a refinement that did not become exact was left with, as a reason."""
+
+from __future__ import annotations
+
+from casadi_hands.diagnosis.moment import moment
+from casadi_hands.diagnosis.reason import Reason, joints_of
+from casadi_hands.problem.model import Model
+from casadi_hands.problem.units import Units
+from casadi_hands.stages.refine.result import Refined
+from casadi_hands.terms import constraints as limits
+
+_JOINTS = "more joints (search.max_joints)"
+
+
+def failing_fingers(model: Model, refined: Refined) -> set[str]:
+    """Names of the fingers that kept a motion from being exact; none if it cannot be laid to fingers."""
+    if refined.met:
+        return set()
+    if refined.slips_hopelessly:
+        most = max(refined.slips.values())
+        return {name for name, slip in refined.slips.items() if slip > 0.3 * most}
+    return {model.contact_names[contact] for contact in refined.worst.contacts}
+
+
+def refined_reason(model: Model, refined: Refined) -> list[Reason]:
+    """Why a refined motion is not exact; nothing if it is."""
+    if refined.exact:
+        return []
+    if refined.met:
+        what = f"fingers can roll with the object over {refined.share:.0%} of the way to its goals, and no farther"
+        advice = f"{_JOINTS}, thicker links (hand.link_radius) or a smaller turn of the object"
+        return [Reason(what, advice, frozenset(("goal_position", "goal_angle")))]
+    joints = {
+        model.contact_names[c]: f.joints for c, f in zip(refined.hand.contacts, refined.hand.fingers, strict=True)
+    }
+    if refined.slips_hopelessly:
+        most = max(refined.slips, key=lambda name: refined.slips[name])
+        slip = 1e3 * refined.slips[most] * model.units.length
+        what = f"finger '{most}' with {joints_of(joints[most])} cannot roll with the object: it slips {slip:.1f} mm"
+        follow = ("friction_excess", "pull", "unsupplied_force", "disturbance_radius", "penetration")
+        return [Reason(what, limits.NO_SLIP.advice, frozenset((*limits.NO_SLIP.explains, *follow)))]
+    worst, who = refined.worst, sorted(failing_fingers(model, refined))
+    limit = worst.declared
+    cannot = limit.cannot or f"meet {worst.constraint}"
+    fingers = " and ".join(f"'{finger}'" for finger in who)
+    subject = f"finger{'s' if len(who) > 1 else ''} {fingers}" if who else "the object"
+    when = "" if worst.time is None else f" at {moment(model.schedule, worst.time)}"
+    what = (
+        f"no exact motion was found with {'+'.join(map(str, joints.values()))} joints: "
+        f"{subject} cannot {cannot}{when}{_by(worst.violation, limit.unit, model.units)}"
+    )
+    return [Reason(what, limit.advice or f"{_JOINTS} or slower goals", frozenset(limit.explains))]
+
+
+def _by(violation: float, unit: str, units: Units) -> str:
+    """By how much a constraint is violated, in SI or weights; nothing if that would say nothing to a reader."""
+    if unit == "length":
+        return f", by {1e3 * violation * units.length:.2g} mm"
+    if unit == "force":
+        return f", by {violation:.2g} weights"
+    if unit == "torque":
+        return f", by {violation * units.torque:.2g} N·m"
+    return f", by {violation:.2g} rad/s" if unit == "speed" else ""

@@ -1,0 +1,1 @@
+"""The page on which a design is looked at in a browser."""

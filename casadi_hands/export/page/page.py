@@ -1,0 +1,112 @@
+"""``viewer.html``: one page with the moving design in it, which opens without a server and without a network."""
+
+from __future__ import annotations
+
+import json
+import re
+import webbrowser
+from base64 import b64encode
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from casadi_hands.errors import DesignError
+from casadi_hands.export.page.scene import Scene, draw_scene
+
+if TYPE_CHECKING:
+    from casadi_hands.problem.result import Result
+
+
+@dataclass(frozen=True)
+class MenuEntry:
+    """One line of a page's menu.
+
+    Attributes:
+        text: what it says.
+        address: the page it leads to, relative to the one it is on; None for that page itself.
+    """
+
+    text: str
+    address: str | None
+
+
+def write_page(design: Result, path: Path, time: float | None = None, menu: Sequence[MenuEntry] = ()) -> None:
+    """Write the page of a design.
+
+    It plays when opened; ``viewer.html#t=1.5`` opens it at 1.5 s, at rest.
+
+    Args:
+        design: whole or partial; what does not exist is not shown.
+        path: the file to write.
+        time: where the page rests when opened without a fragment, s; None to play.
+        menu: pages of other designs to switch to; without any there is no menu.
+    """
+    scene = draw_scene(design)
+    parts = {
+        "title": escape(design.task.name),
+        "summary": escape(_summary(design, scene)),
+        "legend": "".join(
+            f'<li style="--color: rgb({", ".join(str(round(255 * part)) for part in color)})">{escape(name)}</li>'
+            for name, color in scene.legend
+        ),
+        "menu": _menu(menu),
+        "design": _data(scene, time),
+        "meshcat": files("meshcat").joinpath("viewer/dist/main.min.js").read_text(encoding="utf-8"),
+    }
+    page = files("casadi_hands.export.page").joinpath("page.html").read_text(encoding="utf-8")
+    path.write_text(re.sub(r"\{\{(\w+)\}\}", lambda slot: parts[slot[1]], page), encoding="utf-8")
+
+
+def open_page(directory: Path) -> Path:
+    """Open a result folder's page in the browser.
+
+    Args:
+        directory: a result folder.
+
+    Returns:
+        The page's path.
+
+    Raises:
+        DesignError: the folder has no page, or there is no browser to open it in.
+    """
+    page = directory / "viewer.html"
+    if not page.is_file():
+        raise DesignError(f"{directory}: no viewer.html here; give a folder that `casadi-hands solve` wrote")
+    if not webbrowser.open(page.resolve().as_uri()):
+        raise DesignError(f"no browser found; open {page.resolve()} in one yourself")
+    return page
+
+
+def _summary(design: Result, scene: Scene) -> str:
+    """One line: how it ended, how many joints, what an arrow's length means, what replays said."""
+    parts = [design.status]
+    if design.hand is not None:
+        parts.append(f"{len(design.hand.fingers)} fingers, {design.hand.degrees_of_freedom} joints")
+    if scene.longest_force > 0:
+        parts.append(f"longest force arrow {scene.longest_force:.3g} N")
+    if design.replays:
+        parts.append(design.replay_words)
+    return " · ".join(parts)
+
+
+def _menu(entries: Sequence[MenuEntry]) -> str:
+    """Links, which need no script; the page's own entry is marked."""
+    links = []
+    for entry in entries:
+        where = 'aria-current="page"' if entry.address is None else f'href="{escape(entry.address)}"'
+        links.append(f"<a {where}>{escape(entry.text)}</a>")
+    return f'<nav id="menu" aria-label="designs for this task">{"".join(links)}</nav>' if links else ""
+
+
+def _data(scene: Scene, time: float | None) -> str:
+    """What the page's script reads, as JSON that cannot end its script element."""
+    data = {
+        "commands": [b64encode(command).decode("ascii") for command in scene.commands],
+        "eye": scene.eye.tolist(),
+        "span": [float(scene.time[0]), float(scene.time[-1])],
+        "start": time,
+    }
+    return json.dumps(data).replace("<", "\\u003c")

@@ -1,0 +1,108 @@
+"""A finger's symbols: morphology and angles as a kernel's locals, and the bodies they make."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import Protocol
+
+import casadi as ca
+from casadi import SX
+
+from casadi_hands.geometry import clamp, norm
+from casadi_hands.kinematics import STAND, finger_kinematics
+
+
+@dataclass(frozen=True)
+class FingerSymbols:
+    """One finger in a kernel, palm frame.
+
+    Attributes:
+        base: (2,) of the first joint, which stands ``STAND`` link radii above the palm's face.
+        lengths: (n,).
+        axes: (3, n) unit joint axes, parent frames.
+    """
+
+    base: SX
+    lengths: SX
+    axes: SX
+
+    @property
+    def joints(self) -> int:
+        """Number of joints."""
+        return int(self.lengths.numel())
+
+    def placed(self, angles: SX, radius: SX, point: SX | None = None) -> PlacedFinger:
+        """The finger at joint angles (n,), with links of a radius and a contact point (3,) in the last link's frame."""
+        function = finger_kinematics(self.joints)
+        at = SX.zeros(3, 1) if point is None else point
+        base = ca.vertcat(self.base, STAND * radius)
+        origins, rotations, tip, contact, jacobian = function(base, self.axes, self.lengths, angles, at)
+        return PlacedFinger(origins, rotations, tip, contact, jacobian)
+
+
+@dataclass(frozen=True)
+class PlacedFinger:
+    """Forward kinematics, palm frame: joint origins (3, n), rotations (3, 3n), tip, contact (3,), Jacobian (3, n)."""
+
+    origins: SX
+    rotations: SX
+    tip: SX
+    contact: SX
+    jacobian: SX
+
+    @property
+    def ends(self) -> list[tuple[SX, SX]]:
+        """Both ends (3,) of each link's axis."""
+        points = [self.origins[:, j] for j in range(self.origins.shape[1])] + [self.tip]
+        return list(itertools.pairwise(points))
+
+    @property
+    def tip_rotation(self) -> SX:
+        """(3, 3) palm <- last link."""
+        return self.rotations[:, -3:]
+
+
+class Declare(Protocol):
+    """A kernel's ``variable`` or ``parameter``."""
+
+    def __call__(self, name: str, size: int, quantity: str, place: int | None) -> SX:
+        """Declare a symbol (size,)."""
+
+
+def morphology(declare: Declare, frames: SX, joints: int, place: int | None = None) -> FingerSymbols:
+    """Declare a finger's morphology (base 2, lengths n, axis coordinates 2n) with ``declare``.
+
+    Args:
+        declare: a kernel's ``variable`` or ``parameter``.
+        frames: (9n,) for each axis a rotation, columns stacked, whose third column is the seed axis.
+        joints: number of joints.
+        place: which of several fingers of the kernel, appended to the names; None for the only one.
+    """
+    tag = "" if place is None else str(place)
+    base = declare(f"base{tag}", 2, "base", place)
+    lengths = declare(f"lengths{tag}", joints, "lengths", place)
+    coordinates = declare(f"axes{tag}", 2 * joints, "axes", place)
+    axes = [axis(coordinates[2 * j : 2 * j + 2], frames[9 * j : 9 * j + 9]) for j in range(joints)]
+    return FingerSymbols(base, lengths, ca.horzcat(*axes))
+
+
+def axis(coordinates: SX, frame: SX) -> SX:
+    """The unit axis (3,) at exponential coordinates (2,) about the third column of ``frame`` (9,)."""
+    rotation = ca.reshape(frame, 3, 3)
+    angle = norm(coordinates, 1e-5)
+    return ca.mtimes(rotation, ca.vertcat(ca.sin(angle) / angle * coordinates, ca.cos(angle)))
+
+
+def tip_point(coordinates: SX, length: SX, radius: SX) -> tuple[SX, SX]:
+    """A point on the last link's surface and its outward normal, both (3,) in the link's frame.
+
+    The coordinates (2,) point from the cap's pole along the surface: their length is the arc length, which goes
+    over the hemispherical cap and on along the cylinder; on the surface by construction (eq. 2.19 is zero).
+    """
+    arc = norm(coordinates, 1e-5)
+    direction = coordinates / arc
+    angle = clamp(arc / radius, 0, ca.pi / 2)
+    normal = ca.vertcat(ca.sin(angle) * direction, ca.cos(angle))
+    down_the_cylinder = ca.fmax(arc - radius * ca.pi / 2, 0)
+    return radius * normal + ca.vertcat(0, 0, length - down_the_cylinder), normal

@@ -1,0 +1,112 @@
+"""Solve one task from several seeds."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+from casadi_hands.errors import DesignError, SolveError
+from casadi_hands.export.design import Design
+from casadi_hands.export.folder import remove_design
+from casadi_hands.pipeline import STAGES, Progress, solve
+from casadi_hands.pipeline.alternatives.folder import remove_alternatives, remove_surplus, seed_folder, write_ranking
+from casadi_hands.pipeline.alternatives.ranking import Alternative, rank
+from casadi_hands.task import Task
+
+
+def explore(
+    task: Task,
+    *,
+    seeds: Sequence[int],
+    jobs: int | None = None,
+    until: str = "refine",
+    out: Path | str | None = None,
+    executor: Executor | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> list[Alternative]:
+    """Design hands for a task from several seeds, one after the other, and rank them.
+
+    Seeds often find the same hand, so near-duplicates are dropped: hands with the same joints in each finger of which
+    no base, no link's length and no axis differs by much (see `likeness`). At most four distinct hands are kept.
+
+    Args:
+        task: as ``load_task`` gives it.
+        seeds: of the search, in place of the task's.
+        jobs: processes for the trials; all cores by default. The hands do not depend on it.
+        until: the last stage to run.
+        out: folder; each seed is solved into ``alternatives/seedK`` in it. After each seed the best design so far is
+            in ``out`` itself, the ranking in ``alternatives/ranking.json`` and a menu of the distinct hands in their
+            pages. At the end the folders of hands that are not kept are removed; ``solve`` with that seed gives them
+            again.
+        executor: where trials run, in place of processes on this machine, as for ``solve``.
+        progress: told what is being done; its times count from the start of the first seed.
+
+    Returns:
+        What each seed gave, best first; a seed that failed has its reason in the design.
+
+    Raises:
+        SolveError: there are no seeds, ``until`` is not a stage, or the task allows no hand.
+        DesignError: the folder cannot be written.
+    """
+    seeds = list(dict.fromkeys(seeds))
+    if not seeds:
+        raise SolveError("no seeds are given; give at least one")
+    if until not in STAGES:
+        raise SolveError(f"until: given {until!r}; allowed: {', '.join(STAGES)}")
+    out = None if out is None else Path(out)
+    if out is not None:
+        remove_alternatives(out)
+        remove_design(out)
+    report = progress or (lambda _: None)
+    began = time.perf_counter()
+    designs: dict[int, Design] = {}
+    errors: list[SolveError] = []
+    for seed in seeds:
+        folder = None if out is None else seed_folder(out, seed)
+        told = _within(report, seed, time.perf_counter() - began)
+        try:
+            designs[seed] = solve(task, seed=seed, jobs=jobs, until=until, out=folder, executor=executor, progress=told)
+        except SolveError as error:
+            errors.append(error)
+            if len(errors) == len(seeds):
+                raise  # not the seeds' fault
+            designs[seed] = _broken_off(task, seed, folder, error)
+        ranked = rank(designs)
+        if out is not None:
+            write_ranking(ranked, out)
+    if out is not None:
+        remove_surplus(ranked, out)
+    return ranked
+
+
+def _within(report: Callable[[Progress], None], seed: int, before: float) -> Callable[[Progress], None]:
+    """Progress of one seed as progress of the whole.
+
+    Args:
+        report: told of the whole.
+        seed: named in the text.
+        before: s that seeds before this one took.
+    """
+
+    def tell(news: Progress) -> None:
+        report(replace(news, text=f"seed {seed}: {news.text}", elapsed=before + news.elapsed))
+
+    return tell
+
+
+def _broken_off(task: Task, seed: int, folder: Path | None, error: Exception) -> Design:
+    """A failed design with what the solve had written, and why it ended."""
+    search = task.search.model_copy(update={"seed": seed})
+    design = Design(task=task.model_copy(update={"search": search}), status="failed")
+    if folder is not None:
+        # It may have ended before anything was written.
+        with suppress(DesignError):
+            design = Design.load(folder)
+    design = replace(design, status="failed", reason=f"the solve broke off: {str(error) or type(error).__name__}")
+    if folder is not None:
+        design.save(folder)
+    return design

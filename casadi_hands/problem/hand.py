@@ -1,0 +1,74 @@
+"""A designed hand in SI."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    pass
+
+
+@dataclass(frozen=True)
+class Link:
+    """One finger segment: a capsule along its frame's z axis, from the joint to ``(0, 0, length)``.
+
+    Attributes:
+        length: length of the capsule's axis, m.
+        radius: radius of the capsule, m.
+        axis: (3,) unit vector of the joint at the segment's start, in the parent frame. At zero angle
+            every link frame is parallel to the palm's.
+    """
+
+    length: float
+    radius: float
+    axis: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Finger:
+    """A serial finger on the palm.
+
+    Attributes:
+        name: the task's name of the finger and its contact.
+        base: (3,) position of the first joint in the palm frame, m; on the palm's surface, z = 0.
+        links: segments from the palm outwards.
+    """
+
+    name: str
+    base: tuple[float, float, float]
+    links: tuple[Link, ...]
+
+
+@dataclass(frozen=True)
+class Hand:
+    """A palm disc and its fingers; the palm's frame has its origin on the surface and z where fingers point.
+
+    Attributes:
+        palm_radius: m.
+        palm_thickness: m; the disc reaches from z = -thickness to z = 0.
+        fingers: in the order of the task's fingers.
+        joint_lower, joint_upper: limits of every joint, rad.
+        effort: torque limit of every joint, N·m.
+        velocity: speed limit of every joint, rad/s.
+        density: of links and palm, kg/m³, from which masses and inertias follow.
+    """
+
+    palm_radius: float
+    palm_thickness: float
+    fingers: tuple[Finger, ...]
+    joint_lower: float
+    joint_upper: float
+    effort: float
+    velocity: float
+    density: float
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints, in the order of the motion's angles."""
+        return tuple(f"finger{i}_joint{j}" for i, finger in enumerate(self.fingers) for j in range(len(finger.links)))
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Number of joints in the hand."""
+        return sum(len(finger.links) for finger in self.fingers)

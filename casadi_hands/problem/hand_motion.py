@@ -1,0 +1,53 @@
+"""A motion of object and hand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from casadi_hands.kinematics.morphology import FingerSeed
+from casadi_hands.motion.quaternion import quaternion
+from casadi_hands.nlp import Solution
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class WholeHand:
+    """A motion of object and hand at the samples; nondimensional, see ``Model``.
+
+    Attributes:
+        fingers: morphology, one for each contact in ``contacts``; their ``angles`` are at the keyframes.
+        contacts: index of each finger's contact.
+        angles: for each finger (S, n), rad.
+        palm_position: (S, 3) world.
+        palm_quaternion: (S, 4).
+        position: (S, 3) of the object, world.
+        vector: (S, 3) its rotation vector from the reference.
+        point: (S, C, 3) contacts on the object, object frame.
+        force: (S, C, 3) object frame.
+        active: (S, C) bool.
+        solution: of the solver.
+        disturbed: (S, C, 3) forces that hold the object on the same path under the task's perturbations; None without.
+    """
+
+    fingers: tuple[FingerSeed, ...]
+    contacts: tuple[int, ...]
+    angles: tuple[Array, ...]
+    palm_position: Array
+    palm_quaternion: Array
+    position: Array
+    vector: Array
+    point: Array
+    force: Array
+    active: NDArray[np.bool_]
+    solution: Solution
+    disturbed: Array | None = None
+
+
+def turned(start: Array, vector: Array) -> Array:
+    """A quaternion turned further by a rotation vector in the world."""
+    return quaternion(pin.exp3(vector) @ pin.Quaternion(*start).matrix())

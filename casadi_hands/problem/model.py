@@ -1,0 +1,182 @@
+"""The task in the numbers the stages work in: lengths by the characteristic length, forces by m·g, seconds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from casadi_hands.motion import Schedule, held
+from casadi_hands.problem.palm_path import PalmPath
+from casadi_hands.problem.units import Units
+
+Array = NDArray[np.float64]
+_NO_GROUND = -1e3  # half extents
+
+
+@dataclass(frozen=True)
+class Ground:
+    """A horizontal plane; ``patch`` is where on the object it may touch, (3,) object frame."""
+
+    height: float
+    friction: float
+    patch: Array
+    capsule: Array
+
+
+@dataclass(frozen=True)
+class Regrasp:
+    """Contacts that are to move on the object, planned: fingers lift and touch again elsewhere, or slide there.
+
+    Attributes:
+        lifted: (N, C) bool, from its keyframe to the next; the ground's contact, if any, last.
+        patches: (N, C, 3) where contacts are wanted at the keyframes, object frame.
+    """
+
+    lifted: NDArray[np.bool_]
+    patches: Array
+
+
+@dataclass(frozen=True)
+class Model:
+    """Everything the stages need of a task, nondimensional; arrays are read only by agreement.
+
+    Attributes:
+        units: of all numbers here.
+        schedule: keyframes and samples, s.
+        gravity: (3,) weight in m·g.
+        inertia: (3, 3) object frame, in m·length².
+        primitives: (K, 7) start, end, radius of the object's capsules, object frame.
+        contact_names: of the C contacts.
+        patches: (C, 3) the user's contact points, object frame.
+        capsules: (C, 7) the primitive each contact lies on.
+        friction: of fingertip and object.
+        ground: or None.
+        palm_radius: of the disc.
+        palm_position: (S, 3) world, at the samples.
+        palm_quaternion: (S, 4) world from palm, [w, x, y, z].
+        palm_path: where they come from.
+        goal_positions: (G, 3) world; for a drawing the tool's targets.
+        goal_vectors: (G, 3) rotation vectors from the reference orientation, world; zeros for a drawing.
+        goal_tolerance: half extents and rad, what each coordinate may miss a goal by within the task's limits.
+        gap_tolerance: half extents, a part of the task's limit that a contact's surfaces may be apart.
+        slip_tolerance: half extents, a part of the task's limit that a contact may slip from touch to lift.
+        reference: (4,) quaternion of the reference orientation.
+        tool: (3,) object frame, or None when goals are poses.
+        disturbance_force: (S, 3) m·g, world.
+        disturbance_torque: (S, 3) m·g·length, world.
+        link_radius: of all links.
+        link_length: shortest and longest link.
+        joint_limits: lower and upper, rad.
+        torque_limit: of a joint in m·g·length, or inf.
+        speed_limit: of a joint in rad/s, or inf.
+        regrasp: planned, or None where fingers stay where they touch.
+    """
+
+    units: Units
+    schedule: Schedule
+    gravity: Array
+    inertia: Array
+    primitives: Array
+    contact_names: tuple[str, ...]
+    patches: Array
+    capsules: Array
+    friction: float
+    ground: Ground | None
+    palm_radius: float
+    palm_position: Array
+    palm_quaternion: Array
+    palm_path: PalmPath
+    goal_positions: Array
+    goal_vectors: Array
+    goal_tolerance: tuple[float, float]
+    gap_tolerance: float
+    slip_tolerance: float
+    reference: Array
+    tool: Array | None
+    disturbance_force: Array
+    disturbance_torque: Array
+    link_radius: float
+    link_length: tuple[float, float]
+    joint_limits: tuple[float, float]
+    torque_limit: float
+    speed_limit: float
+    regrasp: Regrasp | None = None
+
+    @property
+    def contacts(self) -> int:
+        """Number of finger contacts."""
+        return len(self.contact_names)
+
+    @property
+    def keyframe_patches(self) -> Array:
+        """(N, C, 3) where contacts are wanted at the keyframes, object frame; the ground's, if any, last."""
+        if self.regrasp is not None:
+            return self.regrasp.patches
+        patches = self.patches if self.ground is None else np.vstack([self.patches, self.ground.patch])
+        return np.tile(patches, (len(self.schedule.keyframes), 1, 1))
+
+    @property
+    def ground_height(self) -> float:
+        """Of the ground, or a height that no object reaches where there is none."""
+        return _NO_GROUND if self.ground is None else self.ground.height
+
+    def slides(self, contact: int) -> bool:
+        """Whether a finger's contact is planned to move on the object without lifting."""
+        if self.regrasp is None or self.lifts(contact):
+            return False
+        return bool(np.any(self.regrasp.patches[:, contact] != self.regrasp.patches[0, contact]))
+
+    def lifts(self, contact: int) -> bool:
+        """Whether a finger's contact is planned to lift and touch the object anew."""
+        return self.regrasp is not None and bool(self.regrasp.lifted[:, contact].any())
+
+    @property
+    def held_back(self) -> bool:
+        """Whether contacts are planned to stay behind while the object turns on beneath fingers that cannot let go."""
+        return self.regrasp is not None and not self.regrasp.lifted.any()
+
+    def point_spline(self, contact: int, offset: float = 0.0) -> Array:
+        """(S, N) weights of a contact point at the samples, ``offset`` steps later.
+
+        Around a planned regrasp it stays where it lifts and where it touches, and has not moved before it touches.
+        """
+        schedule = self.schedule
+        if self.regrasp is None:
+            return schedule.spline(offset)
+        lifted = self.regrasp.lifted[:, contact]
+        ends = np.union1d(np.flatnonzero(lifted), np.flatnonzero(lifted) + 1)
+        weights = schedule.spline(offset, ends)
+        now, then = (held(schedule.keyframes, schedule.samples + o * schedule.step) for o in (0.0, offset))
+        touched = lifted[then] & ~lifted[now]
+        weights[touched] = schedule.spline(0.0, ends)[touched]
+        return weights
+
+    @property
+    def goal_poses(self) -> Array:
+        """(G, 6) position and rotation vector from the reference at the goals, world."""
+        return np.hstack([self.goal_positions, self.goal_vectors])
+
+    @property
+    def disturbed(self) -> bool:
+        """Whether the task asks for a second scenario with external wrenches."""
+        return bool(np.any(self.disturbance_force) or np.any(self.disturbance_torque))
+
+
+def palm_from_world(model: Model, time: float) -> tuple[Array, Array]:
+    """Rotation (3, 3) palm <- world and the palm's position (3,) in the world at a time."""
+    sample = int(np.argmin(np.abs(model.schedule.samples - time)))
+    return pin.Quaternion(*model.palm_quaternion[sample]).matrix().T, model.palm_position[sample]
+
+
+def sizes(model: Model) -> tuple[int, int, int]:
+    """Number of keyframes, samples and contacts (the ground's included)."""
+    schedule = model.schedule
+    return len(schedule.keyframes), len(schedule.samples), model.contacts + (model.ground is not None)
+
+
+def sampled_points(model: Model, keyframes: Array) -> Array:
+    """Contact points (S, C, 3) at the samples from those at the keyframes (N, C, 3)."""
+    return np.stack([model.point_spline(c) @ keyframes[:, c] for c in range(keyframes.shape[1])], axis=1)

@@ -1,0 +1,77 @@
+"""The motions that a solve ends with, as they are written: that of the object alone, and that of object and hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from casadi_hands.geometry.contact_points import on_capsules
+from casadi_hands.kinematics.numeric import link_frames
+from casadi_hands.problem.floating_motion import Floating
+from casadi_hands.problem.hand_motion import WholeHand
+from casadi_hands.problem.model import Model, sampled_points
+from casadi_hands.problem.motion import Motion
+from casadi_hands.problem.palm_motion import poses_at
+from casadi_hands.problem.placement import (
+    in_palm,
+    in_world,
+    object_rotation,
+)
+from casadi_hands.problem.si import motion_in_si
+
+Array = NDArray[np.float64]
+
+
+def floating_motion(model: Model, floating: Floating) -> Motion:
+    """The object's motion of stage 1, with no joints and every contact's link named ``none``."""
+    schedule = model.schedule
+    pose = poses_at(model, floating.pose)
+    count = len(schedule.samples)
+    point = sampled_points(model, floating.point)
+    active = floating.active[schedule.sample_keyframes]
+    names = model.contact_names + (("ground",) if model.ground is not None else ())
+    links = ["none"] * model.contacts + (["ground"] if model.ground is not None else [])
+    force, nowhere, angles = floating.force * active[:, :, None], np.zeros_like(point), np.zeros((count, 0))
+    palm = model.palm_position, model.palm_quaternion
+    return motion_in_si(model, pose[:, :3], pose[:, 3:], *palm, angles, (), names, links, active, force, point, nowhere)
+
+
+def whole_hand_motion(model: Model, result: WholeHand) -> Motion:
+    """The motion of stage 3; each contact's point on the link is the point of its surface nearest the object's.
+
+    A contact without a finger, since it never acts, is left out.
+    """
+    count = len(result.force)
+    names = model.contact_names + (("ground",) if model.ground is not None else ())
+    capsules = model.capsules if model.ground is None else np.vstack([model.capsules, model.ground.capsule])
+    point = np.array([on_capsules(p, capsules) for p in result.point])
+    on_link = np.zeros_like(point)
+    links = ["none"] * model.contacts + (["ground"] if model.ground is not None else [])
+    for i, (finger, contact) in enumerate(zip(result.fingers, result.contacts, strict=True)):
+        links[contact] = f"finger{i}_link{finger.joints - 1}"
+        tip = np.array([*np.zeros(3), 0, 0, finger.lengths[-1], model.link_radius])
+        origins, rotations = link_frames(finger, model.link_radius, result.angles[i])
+        from_origin = in_palm(model, result, point[:, contact]) - origins[:, -1]
+        local = np.einsum("sji,sj->si", rotations[:, -1], from_origin)
+        on_link[:, contact] = on_capsules(local, np.tile(tip, (count, 1)))
+    if model.ground is not None:
+        on_link[:, -1] = in_world(model, result, point[:, -1])
+        on_link[:, -1, 2] = model.ground.height
+    angles = np.hstack(result.angles) if result.angles else np.zeros((count, 0))
+    joint_names = tuple(f"finger{i}_joint{j}" for i, f in enumerate(result.fingers) for j in range(f.joints))
+    object_pose, palm = (result.position, result.vector), (result.palm_position, result.palm_quaternion)
+    touch = [c for c, link in enumerate(links) if link != "none"]
+    contacts = tuple(names[c] for c in touch), [links[c] for c in touch]
+    active, force, point, on_link = result.active[:, touch], result.force[:, touch], point[:, touch], on_link[:, touch]
+    motion = motion_in_si(model, *object_pose, *palm, angles, joint_names, *contacts, active, force, point, on_link)
+    if result.disturbed is None:
+        return motion
+    rotations = np.array([object_rotation(model, v) for v in result.vector])
+    return replace(
+        motion,
+        contact_force_disturbed=np.einsum("sij,scj->sci", rotations, result.disturbed[:, touch]) * model.units.force,
+        external_force_disturbed=model.disturbance_force * model.units.force,
+        external_torque_disturbed=model.disturbance_torque * model.units.torque,
+    )

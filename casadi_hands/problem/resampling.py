@@ -1,0 +1,145 @@
+"""A task and a motion of it at other samples, or over a part of its way: easier problems to begin with."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from casadi_hands.geometry.contact_points import on_capsules
+from casadi_hands.motion import Schedule, catmull_rom, continuous, held, linear, nearest_exponential
+from casadi_hands.problem.hand_motion import WholeHand, turned
+from casadi_hands.problem.model import Model
+from casadi_hands.problem.palm_motion import carried_by_palm, goals_seen_from_palm, stands
+
+Array = NDArray[np.float64]
+
+
+def resampled_model(model: Model, schedule: Schedule) -> Model:
+    """The task with other samples between the same keyframes.
+
+    A perturbation lasts to the next of its own samples; of those that act before the next knot a knot has the largest.
+    """
+    was, now = model.schedule.samples, schedule.samples
+    first = held(was, now)
+    end = np.append(np.searchsorted(was, now[1:] - 1e-9), len(was))
+    size = np.linalg.norm(np.hstack([model.disturbance_force, model.disturbance_torque]), axis=1)
+    largest = np.array([i + np.argmax(size[i : max(i + 1, j)]) for i, j in zip(first, end, strict=True)])
+    palm = model.palm_path.at(now)
+    return replace(
+        model,
+        schedule=schedule,
+        palm_position=palm[:, :3],
+        palm_quaternion=palm[:, 3:],
+        disturbance_force=model.disturbance_force[largest],
+        disturbance_torque=model.disturbance_torque[largest],
+    )
+
+
+def resampled(hand: WholeHand, before: Model, after: Model) -> WholeHand:
+    """A motion at the samples of the same task with others.
+
+    All moves on smooth curves, but fingers on straight ones next to a touch or a lift: they turn abruptly there, and a
+    smooth curve would swing them through the object's surface. On a palm that the task moves, curves are as it sees
+    them: it goes its own way, with what the hand adds to it.
+    """
+    was, now = before.schedule.samples, after.schedule.samples
+    between, straight = catmull_rom(was, now), linear(was, now)
+    interval = np.searchsorted(was, now, side="right") - 1
+
+    def joints(contact: int, angles: Array) -> Array:
+        switches = np.flatnonzero(np.diff(hand.active[:, contact])) + 1
+        abrupt = np.isin(interval, [switches - 1, switches])
+        return np.asarray(np.where(abrupt[:, None], straight, between) @ angles)
+
+    moves = not stands(before)
+    if moves:
+        # Seen from a palm that only does what the hand adds to its way.
+        path, finer = before.palm_path.at(was), before.palm_path.at(now)
+        turns = zip(hand.palm_quaternion, path[:, 3:], strict=True)
+        position = hand.palm_position - path[:, :3]
+        vectors = np.array([pin.log3(_matrix(ours) @ _matrix(given).T) for ours, given in turns])
+        hand = on_palm(hand, position + path[0, :3], _turned(vectors, np.tile(path[0, 3:], (len(was), 1))))
+    quaternion = between @ continuous(hand.palm_quaternion)
+    smooth = replace(
+        hand,
+        angles=tuple(map(joints, hand.contacts, hand.angles)),
+        palm_position=between @ hand.palm_position,
+        palm_quaternion=quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True),
+        position=between @ hand.position,
+        vector=between @ hand.vector,
+        point=np.tensordot(between, hand.point, axes=1),
+        force=np.tensordot(straight, hand.force, axes=1),
+        active=hand.active[held(was, now)],
+        disturbed=None,
+    )
+    if not moves:
+        return smooth
+    return on_palm(smooth, between @ position + finer[:, :3], _turned(between @ vectors, finer[:, 3:]))
+
+
+def on_palm(hand: WholeHand, palm_position: Array, palm_quaternion: Array) -> WholeHand:
+    """A motion whose palm goes another way, (S, 3) and (S, 4): what it holds goes along."""
+    position, vector = hand.position.copy(), hand.vector.copy()
+    for k, (was, now) in enumerate(zip(hand.palm_quaternion, palm_quaternion, strict=True)):
+        turn = _matrix(now) @ _matrix(was).T
+        position[k] = palm_position[k] + turn @ (hand.position[k] - hand.palm_position[k])
+        vector[k] = nearest_exponential(turn @ pin.exp3(hand.vector[k]), hand.vector[k] + pin.log3(turn))
+    palm = {"palm_position": palm_position, "palm_quaternion": palm_quaternion}
+    return replace(hand, position=position, vector=vector, **palm)  # type: ignore[arg-type]
+
+
+def _turned(vectors: Array, quaternions: Array) -> Array:
+    return np.array([turned(q, v) for q, v in zip(quaternions, vectors, strict=True)])
+
+
+def _matrix(quaternion: Array) -> Array:
+    return np.asarray(pin.Quaternion(*quaternion).matrix())
+
+
+def shortened(model: Model, share: float) -> Model:
+    """The task over a share of the way from its first goal to each of the others; no contact is planned to move.
+
+    A palm that moves goes all its way, and a share of what the object moves as seen from it.
+    """
+    seen = goals_seen_from_palm(model)
+    goals = carried_by_palm(model, seen[0] + share * (seen - seen[0]), model.schedule.goal_samples)
+    return replace(model, goal_positions=goals[:, :3], goal_vectors=goals[:, 3:], regrasp=None)
+
+
+def extrapolated(model: Model, first: WholeHand, second: WholeHand, by: float) -> WholeHand:
+    """The second motion and ``by`` times what it differs by from the first, of one hand, contacts on the surface."""
+
+    def beyond(a: Array, b: Array) -> Array:
+        return b + by * (b - a)
+
+    points, capsules = beyond(first.point, second.point), model.capsules
+    if model.ground is not None:
+        capsules = np.vstack([capsules, model.ground.capsule])
+    return replace(
+        second,
+        angles=tuple(beyond(a, b) for a, b in zip(first.angles, second.angles, strict=True)),
+        position=beyond(first.position, second.position),
+        vector=beyond(first.vector, second.vector),
+        point=np.array([on_capsules(p, capsules) for p in points]),
+    )
+
+
+def at_rest(model: Model, hand: WholeHand) -> WholeHand:
+    """A motion that stays where the given one starts; on a palm that moves it stays so as seen from there."""
+
+    def still(values: Array) -> Array:
+        return np.repeat(values[:1], len(values), axis=0)
+
+    moving = replace(model, palm_position=hand.palm_position, palm_quaternion=hand.palm_quaternion)
+    pose = np.hstack([still(hand.position), still(hand.vector)])
+    pose = carried_by_palm(moving, pose, np.arange(len(pose)))
+    return replace(
+        hand,
+        angles=tuple(still(angles) for angles in hand.angles),
+        position=pose[:, :3],
+        vector=pose[:, 3:],
+        point=still(hand.point),
+    )

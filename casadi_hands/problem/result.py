@@ -1,0 +1,69 @@
+"""The result of a solve: the hand, its motion, and what was measured of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from casadi_hands.task import Task
+from casadi_hands.problem.hand import Hand
+from casadi_hands.problem.motion import Motion
+
+
+@dataclass(frozen=True)
+class Result:
+    """A designed hand, the motion it makes, and how it came about.
+
+    Attributes:
+        task: the task as solved, every default filled in.
+        status: ``certified``, ``feasible`` or ``failed``.
+        reason: why, in the user's terms, when not certified; else empty.
+        hand: None when no stage has designed one.
+        motion: None when no stage has computed one.
+        costs: stage -> term -> ``{"weight": w, "value": weighted value}``.
+        certificate: figure -> ``{"value": v, "limit": l, "holds": bool}``.
+        replays: one entry for each physics engine that played the design; see ``docs/result-folder.md``.
+        stages: one entry for each solver run.
+        seconds: wall time by stage, and ``total``.
+    """
+
+    task: Task
+    status: str
+    reason: str = ""
+    hand: Hand | None = None
+    motion: Motion | None = None
+    costs: dict[str, dict[str, dict[str, float]]] = field(default_factory=dict)
+    certificate: dict[str, dict[str, Any]] = field(default_factory=dict)
+    replays: list[dict[str, Any]] = field(default_factory=list)
+    stages: list[dict[str, Any]] = field(default_factory=list)
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def missed(self) -> set[str]:
+        """The figures of the certificate that do not hold."""
+        return {name for name, figure in self.certificate.items() if not figure["holds"]}
+
+    @property
+    def missed_in_replays(self) -> set[str]:
+        """Those of them that replays measured: all else may hold, and the hand still not work."""
+        return {name for name in self.missed if name.startswith("replay_")}
+
+    @property
+    def drops(self) -> int | None:
+        """Perturbed replays that drop the object; all where the one as planned does, None where there were none."""
+        if not self.replays:
+            return None
+        first = self.replays[0]
+        return int(first["of"] if first["dropped_as_planned"] else first["dropped"])
+
+    @property
+    def replay_words(self) -> str:
+        """What the replays said, in a line; empty where there were none."""
+        if not self.replays:
+            return ""
+        first = self.replays[0]
+        planned = "drops the object as planned"
+        if not first["dropped_as_planned"]:
+            planned = f"{first['mean']['mm']:.2g} mm and {first['mean']['degrees']:.2g}° off plan on average"
+        return f"in MuJoCo {planned}, {first['dropped']} of {first['of']} perturbed replays drop it"

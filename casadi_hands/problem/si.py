@@ -1,0 +1,255 @@
+"""Where SI and the stages' nondimensional numbers meet: tasks come in; hands and motions go out, and back in."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from casadi_hands.geometry import nearest_on_axis
+from casadi_hands.kinematics import STAND
+from casadi_hands.kinematics.morphology import FingerSeed, frame_about
+from casadi_hands.motion import Schedule, continuous
+from casadi_hands.motion.quaternion import quaternion
+from casadi_hands.problem.hand import Finger, Hand, Link
+from casadi_hands.problem.hand_motion import WholeHand
+from casadi_hands.problem.model import Ground, Model
+from casadi_hands.problem.motion import Motion
+from casadi_hands.problem.palm_path import PalmPath
+from casadi_hands.problem.placement import (
+    contact_jacobians,
+    object_rotation,
+    turned_to_palm,
+    turned_to_world,
+)
+from casadi_hands.problem.units import STANDARD_GRAVITY, Units, round_off
+from casadi_hands.task import Task
+
+Array = NDArray[np.float64]
+_WITHIN = 0.9 / math.sqrt(3)  # share of a limit that each of three coordinates may use
+# Half extents. Beyond these a gap is no contact, and slip would need friction on its cone, whatever a task accepts.
+_MOST_GAP, _MOST_SLIP = 2e-4, 2e-3
+
+
+def build_model(task: Task) -> Model:
+    """Turn a task into nondimensional numbers."""
+    gravity_size = float(np.linalg.norm(task.gravity))
+    acceleration = gravity_size if gravity_size > 0 else STANDARD_GRAVITY
+    length = task.object.half_extent
+    units = Units(length, task.object.mass * acceleration, acceleration)
+    times, places, turns = zip(*task.palm.waypoints, strict=True)
+    goal_times = [goal.at for goal in task.motion]
+    schedule = Schedule.of(goal_times, task.duration, task.keyframes_between, task.time_step, times)
+    primitives = np.array([[*np.ravel(s.segment), s.radius] for s in task.object.shapes]) / length
+    patches = np.array([finger.touches for finger in task.fingers.values()]) / length
+    positions, vectors, reference = _goals(task)
+    palm_path = PalmPath(np.array(times), round_off(np.array(places) / length), np.array(turns))
+    palm = palm_path.at(schedule.samples)
+    forces, torques = _perturbations(task, schedule)
+    ground = None
+    if task.ground is not None:
+        patch = np.asarray(task.ground.touches, float) / length
+        capsule = _nearest_primitive(patch, primitives)
+        height = round_off(task.ground.height / length)
+        ground = Ground(height, task.ground.friction, round_off(patch), round_off(capsule))
+    actuator = task.actuator
+    low, high = task.hand.joint_limits
+    return Model(
+        units=units,
+        schedule=schedule,
+        gravity=round_off(np.asarray(task.gravity) / acceleration),
+        inertia=round_off(np.asarray(task.object.inertia) / (task.object.mass * length**2)),
+        primitives=round_off(primitives),
+        contact_names=tuple(task.fingers),
+        patches=round_off(patches),
+        capsules=round_off(np.array([_nearest_primitive(p, primitives) for p in patches])),
+        friction=task.friction,
+        ground=ground,
+        palm_radius=round_off(task.palm.radius / length),
+        palm_position=palm[:, :3],
+        palm_quaternion=palm[:, 3:],
+        palm_path=palm_path,
+        goal_positions=round_off(positions / length),
+        goal_vectors=vectors,
+        goal_tolerance=(
+            round_off(_WITHIN * task.limits.goal_position / length),
+            _WITHIN * math.radians(task.limits.goal_angle),
+        ),
+        gap_tolerance=round_off(min(0.2 * task.limits.gap / length, _MOST_GAP)),
+        slip_tolerance=round_off(min(0.2 * task.limits.slip / length, _MOST_SLIP)),
+        reference=reference,
+        tool=None if not task.draws else round_off(np.asarray(task.tool) / length),
+        disturbance_force=round_off(forces / units.force),
+        disturbance_torque=round_off(torques / units.torque),
+        link_radius=round_off(task.hand.link_radius / length),
+        link_length=(round_off(task.hand.link_length[0] / length), round_off(task.hand.link_length[1] / length)),
+        joint_limits=(math.radians(low), math.radians(high)),
+        torque_limit=math.inf if actuator is None else round_off(actuator.torque / units.torque),
+        speed_limit=math.inf if actuator is None else actuator.speed,
+    )
+
+
+def _nearest_primitive(point: Array, primitives: Array) -> Array:
+    """The primitive (7,) whose surface is nearest to a point."""
+
+    def distance(primitive: Array) -> float:
+        return abs(float(np.linalg.norm(nearest_on_axis(point, primitive)[1])) - float(primitive[6]))
+
+    return np.asarray(min(primitives, key=distance))
+
+
+def _goals(task: Task) -> tuple[Array, Array, Array]:
+    """Goal positions (m), rotation vectors from the reference, and the reference quaternion."""
+    if task.draws:
+        points = np.array([goal.tool_at for goal in task.motion], float)
+        return points, np.zeros((len(points), 3)), np.array([1.0, 0.0, 0.0, 0.0])
+    positions = np.array([goal.position for goal in task.motion], float)
+    return positions, task.goal_turns(), quaternion(task.motion[0].rotation.matrix)
+
+
+def _perturbations(task: Task, schedule: Schedule) -> tuple[Array, Array]:
+    """External force (S, 3) in N and torque (S, 3) in N·m at the samples."""
+    forces, torques = np.zeros((2, len(schedule.samples), 3))
+    for push in task.perturbations:
+        during = (schedule.samples >= push.start - 1e-9) & (schedule.samples <= push.end + 1e-9)
+        if not during.any():  # a short one between two samples
+            during[np.argmin(np.abs(schedule.samples - (push.start + push.end) / 2))] = True
+        forces[during] += np.asarray(push.force)
+        torques[during] += np.asarray(push.torque)
+    return forces, torques
+
+
+_RESERVE = 1.5  # of torque and speed limits over what the motion uses, where the task names no actuator
+_LEAST = 0.01  # of the object's weight × half extent, and rad/s: no joint is so weak or slow that none could drive it
+
+
+def hand_of(
+    task: Task, model: Model, fingers: Sequence[FingerSeed], contacts: Sequence[int], effort: float, speed: float
+) -> Hand:
+    """The hand in SI; limits of the actuator if the task names one, else 1.5 times the motion's own torque and speed.
+
+    Args:
+        task: for what the stages do not know.
+        model: for the units.
+        fingers: morphology, nondimensional.
+        contacts: index of each finger's contact.
+        effort: largest joint torque of the motion, N·m.
+        speed: largest joint speed of the motion, rad/s.
+    """
+    length = model.units.length
+    built = []
+    for finger, contact in zip(fingers, contacts, strict=True):
+        links = tuple(
+            Link(float(part * length), model.link_radius * length, _triple(a / np.linalg.norm(a)))
+            for part, a in zip(finger.lengths, finger.axis_vectors, strict=True)
+        )
+        base = _triple(np.append(finger.base, STAND * model.link_radius) * length)
+        built.append(Finger(model.contact_names[contact], base, links))
+    actuator = task.actuator
+    return Hand(
+        palm_radius=task.palm.radius,
+        palm_thickness=task.palm.thickness,
+        fingers=tuple(built),
+        joint_lower=model.joint_limits[0],
+        joint_upper=model.joint_limits[1],
+        effort=max(_RESERVE * effort, _LEAST * model.units.torque) if actuator is None else actuator.torque,
+        velocity=max(_RESERVE * speed, _LEAST) if actuator is None else actuator.speed,
+        density=task.hand.density,
+    )
+
+
+def design_change(model: Model, before: WholeHand, after: WholeHand) -> dict[str, dict[str, float]]:
+    """For each finger how far its base moved and its lengths changed at most, m, and its axes turned, rad."""
+    changes = {}
+    for contact, old, new in zip(before.contacts, before.fingers, after.fingers, strict=True):
+        cosines = np.clip((new.axis_vectors * old.axis_vectors).sum(axis=1), -1, 1)
+        changes[model.contact_names[contact]] = {
+            "base": float(np.linalg.norm(new.base - old.base)) * model.units.length,
+            "lengths": float(np.abs(new.lengths - old.lengths).max()) * model.units.length,
+            "axes": float(np.arccos(cosines).max()),
+        }
+    return changes
+
+
+def _triple(vector: Array) -> tuple[float, float, float]:
+    x, y, z = vector.tolist()
+    return x, y, z
+
+
+def finger_from_si(finger: Finger, angles: Array, length: float) -> FingerSeed:
+    """A finger in units of ``length`` (m), with its joint angles at the keyframes."""
+    return FingerSeed(
+        base=np.array(finger.base[:2]) / length,
+        lengths=np.array([link.length for link in finger.links]) / length,
+        frames=np.array([frame_about(np.array(link.axis)) for link in finger.links]),
+        axes=np.zeros((len(finger.links), 2)),
+        angles=angles,
+        tips=np.zeros((0, 2)),
+    )
+
+
+def motion_from_si(motion: Motion, length: float, force: float) -> Motion:
+    """A motion's lengths in units of ``length`` (m) and forces in units of ``force`` (N); nothing else changes."""
+    return replace(
+        motion,
+        object_position=motion.object_position / length,
+        base_position=motion.base_position / length,
+        contact_point_object=motion.contact_point_object / length,
+        contact_point_link=motion.contact_point_link / length,
+        contact_force=motion.contact_force / force,
+    )
+
+
+def motion_in_si(
+    model: Model,
+    position: Array,
+    vector: Array,
+    palm_position: Array,
+    palm_quaternion: Array,
+    angles: Array,
+    joint_names: tuple[str, ...],
+    contact_names: tuple[str, ...],
+    contact_link: Sequence[str],
+    active: NDArray[np.bool_],
+    force: Array,
+    point: Array,
+    on_link: Array,
+) -> Motion:
+    """Dress nondimensional arrays as a ``Motion`` in SI, forces turned into the world."""
+    units = model.units
+    rotations = np.array([object_rotation(model, v) for v in vector])
+    scale = np.full(len(contact_names), units.length)
+    return Motion(
+        time=model.schedule.samples,
+        object_position=position * units.length,
+        object_orientation=continuous(np.array([quaternion(r) for r in rotations])),
+        base_position=palm_position * units.length,
+        base_orientation=continuous(palm_quaternion),
+        joint_angles=angles,
+        joint_names=joint_names,
+        contact_names=contact_names,
+        contact_link=tuple(contact_link),
+        contact_active=active,
+        contact_force=np.einsum("sij,scj->sci", rotations, force) * units.force,
+        contact_point_object=point * units.length,
+        contact_point_link=on_link * scale[None, :, None],
+        external_force=np.zeros_like(position),
+        external_torque=np.zeros_like(position),
+    )
+
+
+def joint_loads(model: Model, result: WholeHand) -> tuple[float, float]:
+    """Largest joint torque (N·m, from contact forces, disturbed ones too) and speed (rad/s) of a motion."""
+    torque, speed = 0.0, 0.0
+    steps = np.diff(model.schedule.samples)[:, None]
+    for i, contact in enumerate(result.contacts):
+        speed = max(speed, float(np.abs(np.diff(result.angles[i], axis=0) / steps).max()))
+        jacobians = contact_jacobians(model, result, i)
+        for forces in (result.force, result.disturbed):
+            if forces is not None:
+                force = turned_to_palm(result, turned_to_world(model, result, forces[:, contact]))
+                torque = max(torque, float(np.abs(np.einsum("sij,si->sj", jacobians, force)).max()))
+    return torque * model.units.torque, speed

@@ -1,1 +1,0 @@
-"""Algorithm 1: add joints, reseed, recombine; and where the work runs."""

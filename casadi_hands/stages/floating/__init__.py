@@ -1,0 +1,1 @@
+"""Stage 1: the object moved by disembodied contacts."""

@@ -1,0 +1,90 @@
+"""Whether the active contacts can make the wrench that a motion needs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+from casadi_hands.geometry.contact_points import inward_normals
+from casadi_hands.problem.model import Model
+from casadi_hands.problem.palm_motion import poses_at
+from casadi_hands.statics.grasp import EDGES, friction_edges, grasp_map
+
+Array = NDArray[np.float64]
+_PRELOAD = 1.0  # m·g, normal force of the first guess
+_PIVOT_RANK = 5  # of the grasp map of two contacts
+_GATE = 0.05  # m·g, unbalanced wrench that the gate lets pass: what the soft stages leave anyway
+
+
+def _surfaces(model: Model) -> tuple[Array, Array, Array]:
+    """Patches, capsules and friction of all contacts, the ground's included."""
+    if model.ground is None:
+        return model.patches, model.capsules, np.full(model.contacts, model.friction)
+    ground = model.ground
+    friction = np.append(np.full(model.contacts, model.friction), ground.friction)
+    return np.vstack([model.patches, ground.patch]), np.vstack([model.capsules, ground.capsule]), friction
+
+
+def least_squares_forces(model: Model, rotation: Array) -> Array:
+    """Contact forces (C, 3) in the object's frame that hold its weight: a normal preload, corrected to balance."""
+    points, capsules, _ = _surfaces(model)
+    preload = _PRELOAD * inward_normals(points, capsules)
+    grasp = grasp_map(points)
+    missing = np.concatenate([-rotation.T @ model.gravity, np.zeros(3)]) - grasp @ preload.reshape(-1)
+    return preload + (np.linalg.pinv(grasp) @ missing).reshape(-1, 3)
+
+
+def needed_wrenches(model: Model, pose: Array) -> Array:
+    """Wrench (N, 6) in m·g and m·g·length, object frame, that contacts must make at each keyframe of a motion.
+
+    Args:
+        model: the task.
+        pose: (N, 6) keyframes: position and rotation vector from the reference.
+    """
+    schedule, inertial = model.schedule, model.units.inertial
+    at = schedule.keyframe_samples
+    before, now, after = (poses_at(model, pose, offset)[at] for offset in (-1, 0, 1))
+    acceleration = (after - 2 * now + before)[:, :3] / schedule.step**2
+    reference = pin.Quaternion(*model.reference).matrix()
+    wrenches = []
+    for k in range(len(pose)):
+        turns = [pin.exp3(row[3:]) @ reference for row in (before[k], now[k], after[k])]
+        spins = [pin.log3(turns[i].T @ turns[i + 1]) / schedule.step for i in range(2)]
+        omega, alpha = (spins[0] + spins[1]) / 2, (spins[1] - spins[0]) / schedule.step
+        force = turns[1].T @ (inertial * acceleration[k] - model.gravity)
+        torque = inertial * (np.cross(omega, model.inertia @ omega) + model.inertia @ alpha)
+        wrenches.append(np.concatenate([force, torque]))
+    return np.array(wrenches)
+
+
+def passes_gate(model: Model, values: Mapping[str, Array], pivots: bool = False) -> bool:
+    """Whether at every keyframe the active contacts have the rank of all contacts and can make the needed wrench.
+
+    The needed wrench is the motion's own: inertial forces less gravity, in the object's frame. With ``pivots`` the
+    rank of two contacts is enough: the object may hang between them, free about their line, while a finger lifts.
+    """
+    wrenches_needed = needed_wrenches(model, values["pose"])
+    _, capsules, friction = _surfaces(model)
+    contacts = len(capsules)
+    for k in range(len(model.schedule.keyframes)):
+        points = values["point"][k].reshape(contacts, 3)
+        active = values["activity"][k] > 0.5
+        needed = wrenches_needed[k]
+        if not active.any():
+            return False
+        grasp = grasp_map(points[active])
+        all_hold = np.linalg.matrix_rank(grasp_map(points), 1e-6)
+        if np.linalg.matrix_rank(grasp, 1e-6) < (min(all_hold, _PIVOT_RANK) if pivots else all_hold):
+            return False
+        edges = friction_edges(inward_normals(points[active], capsules[active]), friction[active])
+        wrenches = np.vstack([edges, np.zeros((3, edges.shape[1]))])
+        for i, point in enumerate(points[active]):
+            span = slice(i * EDGES, (i + 1) * EDGES)
+            wrenches[3:, span] = np.cross(point[None, :], edges[:, span].T).T
+        if nnls(wrenches, needed)[1] > _GATE:
+            return False
+    return True

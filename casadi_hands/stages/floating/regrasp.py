@@ -1,0 +1,82 @@
+"""Where fingers cannot follow: a contact that the object's turn would carry too far is taken anew, or held back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from casadi_hands.geometry.contact_points import on_capsules
+from casadi_hands.problem.model import Model, Regrasp, palm_from_world
+
+Array = NDArray[np.float64]
+# That a contact travels around the object, seen from the palm: beyond it fingers reach around.
+FARTHEST = np.radians(100)
+HELD_WITHIN = np.radians(60)  # likewise, of contacts that cannot be taken anew: near enough for fingers to roll on
+
+
+def planned_regrasp(model: Model, pose: Array) -> Regrasp | None:
+    """Contacts that let go before they have travelled too far, and take the object again where they first took it.
+
+    A contact's way is the angle at the object's centre, in the palm frame, between where it touched and where the
+    object's turn has carried it. It lifts one keyframe before that exceeds ``FARTHEST`` and touches again at the next.
+
+    Args:
+        model: the task.
+        pose: (N, 6) of the object at the keyframes.
+
+    Returns:
+        The plan, or None where every contact can stay.
+    """
+    turns, keyframes = _turns(model, pose), model.schedule.keyframes
+    patches = model.keyframe_patches.copy()
+    lifted = np.zeros(patches.shape[:2], bool)
+    for c in range(model.contacts):
+        taken = turns[0] @ patches[0, c]  # where a finger takes the object, palm frame from its centre
+        for k in range(1, len(keyframes)):
+            # The last keyframe is too late to touch again.
+            if _angle(turns[k] @ patches[k, c], taken) > FARTHEST and k < len(keyframes) - 1:
+                lifted[k - 1, c] = True
+                patches[k:, c] = _on_surface(model, c, turns[k].T @ taken)
+    return Regrasp(lifted, patches) if lifted.any() else None
+
+
+def held_back(model: Model, pose: Array) -> Regrasp:
+    """Contacts that stay within ``HELD_WITHIN`` of where they touched, while the object turns on beneath them.
+
+    For a turn that fingers cannot follow and during which none of them can let go: they must roll, or slide.
+
+    Args:
+        model: the task.
+        pose: (N, 6) of the object at the keyframes.
+    """
+    turns, patches = _turns(model, pose), model.keyframe_patches.copy()
+    for c in range(model.contacts):
+        taken = turns[0] @ patches[0, c]
+        for k in range(1, len(turns)):
+            carried = turns[k] @ patches[k - 1, c]
+            patches[k, c] = patches[k - 1, c]
+            beyond = _angle(carried, taken) - HELD_WITHIN
+            if beyond > 0:
+                axis = np.cross(carried, taken)
+                back = pin.exp3(beyond * axis / np.linalg.norm(axis)) @ carried
+                patches[k, c] = _on_surface(model, c, turns[k].T @ back)
+    return Regrasp(np.zeros(patches.shape[:2], bool), patches)
+
+
+def _turns(model: Model, pose: Array) -> list[Array]:
+    """Rotations (3, 3) of the object at the keyframes, palm frame."""
+    reference = pin.Quaternion(*model.reference).matrix()
+    return [
+        palm_from_world(model, t)[0] @ pin.exp3(row[3:]) @ reference
+        for t, row in zip(model.schedule.keyframes, pose, strict=True)
+    ]
+
+
+def _on_surface(model: Model, contact: int, point: Array) -> Array:
+    capsule = model.capsules[contact : contact + 1]
+    return np.asarray(on_capsules(point[None], capsule)[0])
+
+
+def _angle(first: Array, second: Array) -> float:
+    return float(np.arctan2(np.linalg.norm(np.cross(first, second)), first @ second))

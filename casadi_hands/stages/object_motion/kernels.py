@@ -1,0 +1,192 @@
+"""The object's blocks of the floating and the whole-hand stage: physics, contacts, goals, clearance, most as costs."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import casadi as ca
+from casadi import SX
+
+from casadi_hands.geometry import point_disc_distance
+from casadi_hands.motion import angular_motion, exponential, multiply, rotation_matrix
+from casadi_hands.motion.pose import placed
+from casadi_hands.nlp import Kernel
+from casadi_hands.stages.object_motion.palm import Palm
+from casadi_hands.terms import body, clearance, contact
+from casadi_hands.terms import constraints as limits
+
+
+@cache
+def dynamics(contacts: int, suffix: str = "", regularise: bool = True) -> Kernel:
+    """Newton–Euler at one sample (eq. 2.5, 2.6) and the object's accelerations (eq. 2.14, 2.15).
+
+    What a palm that moves carries is accelerated with it; only what differs from that costs.
+
+    Args:
+        contacts: number of contacts, the ground's included.
+        suffix: of the term names, for a second scenario.
+        regularise: whether to add the terms that do not depend on forces.
+    """
+    kernel = Kernel("dynamics" + suffix)
+    poses = [kernel.variable(f"pose{i}", 6, "pose", i) for i in range(3)]
+    points = ca.reshape(kernel.variable("points", 3 * contacts, "point"), 3, contacts)
+    forces = ca.reshape(kernel.variable("forces", 3 * contacts, "force"), 3, contacts)
+    activity = kernel.variable("activity", contacts)
+    reference, step = kernel.parameter("reference", 4), kernel.parameter("step")
+    gravity = kernel.parameter("gravity", 3)
+    external, external_torque = kernel.parameter("external_force", 3), kernel.parameter("external_torque", 3)
+    inertia, inertial = ca.reshape(kernel.parameter("inertia", 9), 3, 3), kernel.parameter("inertial")
+    before, now, after = (placed(pose, reference) for pose in poses)
+    acceleration = (after[0] - 2 * now[0] + before[0]) / step**2
+    omega, alpha = angular_motion(before[1], now[1], after[1], step)
+    rotation = rotation_matrix(now[1])
+    inertial_torque = inertial * body.gyroscopic(inertia, omega, alpha)
+    kernel.cost(
+        "linear_momentum" + suffix,
+        body.linear_momentum(ca.mtimes(rotation, forces), activity, gravity, external, acceleration, inertial),
+    )
+    local_torque = ca.mtimes(rotation.T, external_torque)
+    kernel.cost(
+        "angular_momentum" + suffix, body.angular_momentum(points, forces, activity, local_torque, inertial_torque)
+    )
+    if regularise:
+        kernel.cost("object_acceleration", acceleration - kernel.parameter("carried_acceleration", 3))
+        kernel.cost("object_angular_acceleration", inertial_torque / step)
+    return kernel
+
+
+@cache
+def contact_forces(suffix: str = "") -> Kernel:
+    """One finger contact at one sample: eq. 2.7, 2.8, 2.10, 2.12 and the slip they miss.
+
+    Friction is also a constraint: the exponential of eq. 2.8 alone lets forces out of the cone by 0.1 m·g.
+    """
+    kernel = Kernel("contact" + suffix)
+    force, activity = kernel.variable("force", 3), kernel.variable("activity", 1)
+    point = kernel.variable("point", 3, place=0)
+    before = kernel.variable("point_before", 3, "point", -1)
+    capsule, friction, sharpness, step = (
+        kernel.parameter(n, k) for n, k in (("capsule", 7), ("friction", 1), ("sharpness", 1), ("step", 1))
+    )
+    projection, normal, _ = contact.surface(point, capsule)
+    projection_before, _, _ = contact.surface(before, capsule)
+    kernel.cost("force_regularisation" + suffix, activity * force)
+    kernel.cost("raw_force" + suffix, force)
+    cone = contact.friction_cone(force, -normal, friction, sharpness)
+    kernel.cost("friction_cone" + suffix, activity * cone, "sum")
+    kernel.constrain(limits.IN_CONE, contact.cone_margin(force, -normal, friction))
+    kernel.cost("contact_on_object" + suffix, contact.off_surface(force, activity, point, projection), "sum")
+    gaps = (projection - point, projection_before - before)
+    kernel.cost("slip_on_object" + suffix, contact.gap_rate(force, activity, *gaps, step))
+    kernel.cost("tangential_slip" + suffix, contact.slip(force, activity, point, before, step))
+    return kernel
+
+
+@cache
+def contact_motion() -> Kernel:
+    """Where one contact point goes: eq. 2.13, and a weak pull to the user's patch."""
+    kernel = Kernel("contact_motion")
+    before, point, after = (kernel.variable(f"point{i}", 3, "point", i) for i in range(3))
+    patch, step = kernel.parameter("patch", 3), kernel.parameter("step")
+    kernel.cost("contact_acceleration", contact.acceleration(before, point, after, step))
+    kernel.cost("contact_patch", point - patch)
+    return kernel
+
+
+@cache
+def ground_contact(suffix: str = "") -> Kernel:
+    """The contact of object and ground at one sample (section 3.1); its normal is the world's z."""
+    kernel = Kernel("ground" + suffix)
+    pose, pose_before = kernel.variable("pose", 6, place=0), kernel.variable("pose_before", 6, "pose", -1)
+    point, force, activity = kernel.variable("point", 3), kernel.variable("force", 3), kernel.variable("activity", 1)
+    reference, capsule = kernel.parameter("reference", 4), kernel.parameter("capsule", 7)
+    height = kernel.parameter("ground_height")
+    friction, sharpness, step = (kernel.parameter(n) for n in ("friction", "sharpness", "step"))
+    position, quaternion = placed(pose, reference)
+    rotation = rotation_matrix(quaternion)
+    position_before, quaternion_before = placed(pose_before, reference)
+    in_world = position + ca.mtimes(rotation, point)
+    in_world_before = position_before + ca.mtimes(rotation_matrix(quaternion_before), point)
+    projection, normal, _ = contact.surface(point, capsule)
+    kernel.cost("force_regularisation" + suffix, activity * force)
+    kernel.cost("raw_force" + suffix, force)
+    upward_in_object = rotation.T[:, 2]
+    cone = contact.friction_cone(force, upward_in_object, friction, sharpness)
+    kernel.cost("ground_friction_cone" + suffix, activity * cone, "sum")
+    kernel.constrain(limits.IN_CONE, contact.cone_margin(force, upward_in_object, friction))
+    off = contact.off_surface(force, activity, point, projection)
+    kernel.cost("contact_on_object" + suffix, off, "sum")
+    above = contact.off_surface(force, activity, in_world[2], height)
+    tilted = contact.off_surface(force, activity, normal, -upward_in_object)
+    kernel.cost("contact_on_ground" + suffix, above + 0.1 * tilted, "sum")
+    kernel.cost("slip_on_ground" + suffix, contact.slip(force, activity, in_world, in_world_before, step))
+    return kernel
+
+
+@cache
+def goal_pose() -> Kernel:
+    """The task term at one goal (eq. 2.9)."""
+    kernel = Kernel("goal")
+    pose = kernel.variable("pose", 6)
+    reference = kernel.parameter("reference", 4)
+    target, vector = kernel.parameter("target", 3), kernel.parameter("vector", 3, "goal_vector")
+    position, turned = placed(pose, reference)
+    kernel.cost("task", body.task_pose(position, turned, target, multiply(exponential(vector), reference)), "sum")
+    return kernel
+
+
+@cache
+def goal_point() -> Kernel:
+    """The task term of a drawing at one sample of its path (fig. 3.4)."""
+    kernel = Kernel("goal")
+    pose = kernel.variable("pose", 6)
+    reference = kernel.parameter("reference", 4)
+    target, tool = kernel.parameter("target", 3), kernel.parameter("tool", 3)
+    position, quaternion = placed(pose, reference)
+    kernel.cost("task", body.task_point(position, rotation_matrix(quaternion), tool, target))
+    return kernel
+
+
+@cache
+def straight_path() -> Kernel:
+    """One keyframe's distance (6,) from the straight way between goals: lengths and rad.
+
+    Without it the object wanders where no goal holds it, to wherever forces are smallest.
+    """
+    kernel = Kernel("straight_path")
+    pose, straight = kernel.variable("pose", 6), kernel.parameter("straight", 6)
+    kernel.cost("path", pose - straight)
+    return kernel
+
+
+def capsule_in(pose_position: SX, rotation: SX, capsule: SX) -> tuple[SX, SX]:
+    """Both ends (3,) of a primitive's axis, moved by a pose."""
+    return pose_position + ca.mtimes(rotation, capsule[:3]), pose_position + ca.mtimes(rotation, capsule[3:6])
+
+
+@cache
+def palm_clearance(moves: bool) -> Kernel:
+    """One primitive of the object against palm and ground at one sample (section 3.2.3)."""
+    kernel = Kernel("palm_clearance")
+    pose = kernel.variable("pose", 6)
+    palm = Palm(kernel, moves)
+    reference, capsule = kernel.parameter("reference", 4), kernel.parameter("capsule", 7)
+    palm_radius, ground, margin = (kernel.parameter(name) for name in ("palm_radius", "ground_height", "clearance"))
+    position, quaternion = placed(pose, reference)
+    ends = capsule_in(position, rotation_matrix(quaternion), capsule)
+    costs: list[SX] = []
+    for point in (ends[0], (ends[0] + ends[1]) / 2, ends[1]):
+        distance = point_disc_distance(palm.sees(point), palm_radius) - capsule[6]
+        costs.append(clearance.overlap(margin - distance))
+        costs.append(clearance.overlap(ground - (point[2] - capsule[6])))
+    kernel.cost("palm_clearance", ca.vertcat(*costs), "sum")
+    return kernel
+
+
+@cache
+def enough_contacts(contacts: int) -> Kernel:
+    """The sum of the contact invariants at one keyframe, to be bounded below."""
+    kernel = Kernel("enough_contacts")
+    activity = kernel.variable("activity", contacts)
+    kernel.constrain(limits.ENOUGH_CONTACTS, ca.sum1(activity))
+    return kernel

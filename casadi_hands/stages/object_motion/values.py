@@ -1,0 +1,121 @@
+"""The object's motion, contacts and forces as a part of a problem: bounds, parameter values and weights."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from casadi_hands.motion import eased, linear
+from casadi_hands.nlp import Problem
+from casadi_hands.problem.model import Model, sizes
+from casadi_hands.problem.palm_motion import carried_along, carried_by_palm, goals_seen_from_palm
+
+Array = NDArray[np.float64]
+CLEARANCE = 0.02  # half extents, asked of object and palm, and in exact motions of all bodies that do not touch
+GOAL_TOLERANCE = 5e-4  # half extents and rad, each coordinate: the task's cost alone gives way to slow accelerations
+MOST_FORCE = 20.0  # m·g, a bound on each component of a contact force
+MOST_TURN = 5.6  # rad, up to where the exponential map's coordinates are used
+_WEIGHT_OF = {  # terms of the ground's contact take the weights of the fingers' ones
+    "ground_friction_cone": "friction_cone",
+    "contact_on_ground": "contact_on_object",
+    "slip_on_ground": "tangential_slip",
+}
+
+
+def least_contacts(model: Model) -> int:
+    """How many contacts act at every keyframe."""
+    return min(2, model.contacts)
+
+
+def tool_path(model: Model) -> Array:
+    """Where a drawing's tool must be at the samples, (S, 3) world: on straight lines, at rest at every goal."""
+    return _between_goals(model, model.schedule.samples) @ model.goal_positions
+
+
+def _between_goals(model: Model, times: Array) -> Array:
+    """Weights (T, G) of the goals on the straight way between them; a drawing slows down at its corners."""
+    goals = model.schedule.keyframes[list(model.schedule.goals)]
+    if model.tool is not None:
+        times = eased(goals, times)
+    return linear(goals, times)
+
+
+def straight_path(model: Model) -> Array:
+    """Poses (N, 6) at the keyframes on the straight way between goals, as a palm that moves sees it.
+
+    A drawing's object stays upright, and its tool on the straight way in the world.
+    """
+    between, schedule = _between_goals(model, model.schedule.keyframes), model.schedule
+    if model.tool is not None:
+        return between @ np.hstack([model.goal_positions - model.tool, model.goal_vectors])
+    return carried_by_palm(model, between @ goals_seen_from_palm(model), schedule.keyframe_samples)
+
+
+def carried_acceleration(model: Model) -> Array:
+    """Acceleration (S, 3), lengths/s², at the samples, that the palm's motion gives an object it carries."""
+    schedule = model.schedule
+    before, now, after = (carried_along(model, schedule.at(offset))[:, :3] for offset in (-1, 0, 1))
+    return np.asarray((after - 2 * now + before) / schedule.step**2)
+
+
+def pose_bounds(model: Model) -> tuple[Array, Array]:
+    """Box bounds (N, 6) of the keyframe poses: close to the goals, else as far as coordinates serve."""
+    widest = np.tile([np.inf] * 3 + [MOST_TURN] * 3, (sizes(model)[0], 1))
+    lower, upper = -widest, widest
+    if model.tool is None:
+        goals = model.goal_poses
+        chosen = list(model.schedule.goals)
+        lower[chosen], upper[chosen] = goals - GOAL_TOLERANCE, goals + GOAL_TOLERANCE
+    return lower, upper
+
+
+def object_parameters(model: Model) -> dict[str, Array | float]:
+    """Values of all parameters of the object's side but the weights."""
+    ground = model.ground
+    values: dict[str, Array | float] = {
+        "reference": model.reference,
+        "step": model.schedule.step,
+        "gravity": model.gravity,
+        "external_force": 0.0,
+        "external_torque": 0.0,
+        "inertia": model.inertia.reshape(1, 9),
+        "inertial": model.units.inertial,
+        "friction": model.friction,
+        "clearance": CLEARANCE,
+        "ground_height": model.ground_height,
+        "patches": model.keyframe_patches[model.schedule.sample_keyframes].reshape(sizes(model)[1], -1),
+        "palm_position": model.palm_position,
+        "palm_quaternion": model.palm_quaternion,
+        "palm_radius": model.palm_radius,
+        "primitives": model.primitives,
+        "targets": model.goal_positions,
+        "straight": straight_path(model),
+        "carried_acceleration": carried_acceleration(model),
+    }
+    if model.tool is not None:
+        values["tool"], values["targets"] = model.tool, tool_path(model)
+    else:
+        values["vectors"] = model.goal_vectors
+    for suffix in ("", "_perturbed") if model.disturbed else ("",):
+        values[f"capsules{suffix}"] = model.capsules
+        if ground is not None:
+            values[f"ground_capsule{suffix}"] = ground.capsule
+            values[f"ground_friction{suffix}"] = ground.friction
+    if model.disturbed:
+        values["external_force_perturbed"] = model.disturbance_force
+        values["external_torque_perturbed"] = model.disturbance_torque
+    return values
+
+
+def term_weights(problem: Problem, model: Model, weights: Mapping[str, float]) -> dict[str, float]:
+    """Weight parameters of a stage: all terms but the task's are divided by the number of keyframes."""
+    keyframes, samples, _ = sizes(model)
+    count = samples if model.tool is not None else len(model.goal_positions)
+    values = {}
+    for term in problem.terms:
+        plain = term.removesuffix("_perturbed")
+        weight = float(weights[_WEIGHT_OF.get(plain, plain)])
+        values[f"weight.{term}"] = weight / (count if plain == "task" else keyframes)
+    return {**values, "sharpness": float(weights["friction_sharpness"])}

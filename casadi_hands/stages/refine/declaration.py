@@ -1,0 +1,158 @@
+"""The variables and parameters of the refine stage's problem, and how blocks are bound to its knots."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from casadi_hands.kinematics.singularity import SIZES
+from casadi_hands.nlp import Kernel, Parameter, Problem, Rows
+from casadi_hands.nlp.arguments import Argument
+from casadi_hands.problem.model import Model
+from casadi_hands.problem.structure import Structure
+from casadi_hands.stages.object_motion.values import MOST_FORCE
+from casadi_hands.stages.synthesis.stage import AXIS_RANGE
+
+JOINT_MARGIN = 0.005  # rad, so that a smooth curve through the knots stays within the limits between them
+FREE = (-np.inf, np.inf)
+IN_CONE = {"pressing": (0.0, np.inf), "cone": (0.0, np.inf)}
+Knots = NDArray[np.int64]
+Bounds = Mapping[str, tuple[ArrayLike, ArrayLike]]
+
+
+@dataclass(frozen=True)
+class Block:
+    """A kernel bound to some knots.
+
+    Attributes:
+        kernel: bound.
+        knots: the knot that each instance is at, or begins at; None where it has no time.
+        contacts: indices of the contacts that it is about; none where it is the object's.
+    """
+
+    kernel: Kernel
+    knots: Knots | None
+    contacts: tuple[int, ...]
+
+
+class Declaration:
+    """The problem of one structure before its blocks are bound.
+
+    Attributes:
+        structure: it is built for.
+        problem: its variables and parameters.
+        knots: their number.
+        disturbed: those at which the task's disturbances act.
+        blocks: those with constraints, by name.
+    """
+
+    def __init__(self, structure: Structure) -> None:
+        """Declare variables and parameters."""
+        self.structure, self.problem = structure, Problem()
+        self.blocks: dict[str, Block] = {}
+        self.knots = len(structure.model.schedule.samples)
+        self.disturbed = disturbed_knots(structure.model)
+        self._declare_variables()
+        self._declare_parameters()
+
+    def _declare_variables(self) -> None:
+        problem, structure, model = self.problem, self.structure, self.structure.model
+        count, width = self.knots, 3 * len(structure.columns)
+        self.pose = problem.variable("pose", (count, 6))
+        self.rate = problem.variable("rate", (count, 6))
+        self.point = problem.variable("point", (count, width))
+        self.force = problem.variable("force", (count, width), -MOST_FORCE, MOST_FORCE)
+        self.wrench = problem.variable("wrench", (count, 6))
+        self.middle_torque = problem.variable("middle_torque", (count - 1, 3))
+        if len(self.disturbed):
+            shape = (len(self.disturbed), width)
+            self.force_disturbed = problem.variable("force_disturbed", shape, -MOST_FORCE, MOST_FORCE, quantity="force")
+        lowest, highest = model.joint_limits
+        limits, reach = (lowest + JOINT_MARGIN, highest - JOINT_MARGIN), model.palm_radius
+        self.angles: list[Rows] = []
+        self.shape: list[dict[str, Rows]] = []
+        for c, n in zip(structure.contacts, structure.joints, strict=True):
+            self.angles.append(problem.variable(f"angles{c}", (count, n), *limits, quantity="angles", owner=c))
+            shapes: dict[str, tuple[int, float, float]] = {
+                "base": (2, -reach, reach),
+                "lengths": (n, *model.link_length),
+                "axes": (2 * n, -AXIS_RANGE, AXIS_RANGE),
+            }
+            self.shape.append(
+                {
+                    name: problem.variable(f"{name}{c}", (1, size), low, high, quantity=name, owner=c)
+                    for name, (size, low, high) in shapes.items()
+                }
+            )
+
+    def _declare_parameters(self) -> None:
+        problem, structure, count = self.problem, self.structure, self.knots
+        widths = {"reference": 4, "gravity": 3, "inertial": 1, "inertia": 9, "inverse": 9, "radius": 1}
+        widths |= {"palm_radius": 1, "ground_height": 1, "friction": 1}
+        widths |= {"primitives": 7 * len(structure.model.primitives)}
+        for name, width in widths.items():
+            problem.parameter(name, (1, width))
+        problem.parameter("step", (count - 1, 1))
+        for name, width in (("palm_position", 3), ("palm_quaternion", 4), ("wanted_pose", 6)):
+            problem.parameter(name, (count, width))
+        for name, width in (("palm_position", 3), ("palm_quaternion", 4)):
+            problem.parameter(f"{name}_between", (count - 1, width), quantity=name)
+        for c in structure.columns:
+            self._own("capsule", c, (1, 7))
+            for name in ("wanted_point", "wanted_force"):
+                self._own(name, c, (count, 3))
+        for c, n in zip(structure.contacts, structure.joints, strict=True):
+            self._own("helper", c, (count, 3))
+            self._own("tie", c, (1, 1))
+            if n in SIZES:
+                self._own("branch", c, (count, SIZES[n]))
+            for name, width in (("frames", 9 * n), ("wanted_base", 2), ("wanted_lengths", n), ("wanted_axes", 2 * n)):
+                self._own(name, c, (1, width))
+
+    def _own(self, name: str, contact: int, shape: tuple[int, int]) -> None:
+        """Declare a parameter of one contact."""
+        self.problem.parameter(f"{name}{contact}", shape, quantity=name, owner=contact)
+
+    def at(self, knots: Knots, *names: str) -> dict[str, Parameter]:
+        """Parameters that all contacts share, of those that differ from knot to knot only the rows of some knots."""
+        return {name: self.problem[name].take(knots) for name in names}
+
+    def of(self, contact: int, knots: Knots, *names: str) -> dict[str, Parameter]:
+        """Parameters of one contact, likewise."""
+        return {name: self.problem[f"{name}{contact}"].take(knots) for name in names}
+
+    def between(self, knots: Knots) -> dict[str, Parameter]:
+        """The palm's pose in the middle of the intervals that begin at some knots."""
+        names = ("palm_position", "palm_quaternion")
+        return {name: self.problem[f"{name}_between"].take(knots) for name in names}
+
+    def steps(self, *intervals: Knots) -> list[Parameter]:
+        """The times from knots to the next ones."""
+        return [self.problem["step"].take(i) for i in intervals]
+
+    def scene(self, contact: int, knots: Knots) -> dict[str, Parameter]:
+        """What places object and palm for a contact at some knots."""
+        names = ("reference", "palm_position", "palm_quaternion", "radius")
+        return self.at(knots, *names) | self.of(contact, knots, "capsule")
+
+    def bind(
+        self,
+        knots: Knots | None,
+        kernel: Kernel,
+        bounds: Bounds,
+        contacts: tuple[int, ...] = (),
+        block: str = "",
+        /,
+        **arguments: Argument | Sequence[Argument],
+    ) -> None:
+        """Bind a block with constraints, and keep what it is about."""
+        self.problem.bind(kernel, bounds, block, **arguments)
+        self.blocks[block or kernel.name] = Block(kernel, knots, contacts)
+
+
+def disturbed_knots(model: Model) -> Knots:
+    """Knots at which the task's disturbances act."""
+    return np.flatnonzero(np.any(np.hstack([model.disturbance_force, model.disturbance_torque]), axis=1))

@@ -1,0 +1,173 @@
+"""The fingers' blocks of the refine stage, bound to its knots."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from casadi_hands.kinematics.singularity import SIZES
+from casadi_hands.nlp import Parameter, Rows
+from casadi_hands.stages.object_motion.values import CLEARANCE
+from casadi_hands.stages.refine import finger_kernels as kernels
+from casadi_hands.stages.refine.declaration import FREE, IN_CONE, Declaration, Knots
+
+
+def bind_contact(of: Declaration, i: int) -> None:
+    """A finger's contact: on both surfaces, in its cone, actuated, rolling, also under the task's disturbances."""
+    structure = of.structure
+    c, n, torque = structure.contacts[i], structure.joints[i], structure.model.torque_limit
+    point, force = (rows.entries(3 * i, 3 * i + 3) for rows in (of.point, of.force))
+    # The torque is bound only where the task limits it.
+    actuated = {**IN_CONE, "passive": FREE, "torque": (-torque, torque)}
+    limited = bool(np.isfinite(torque))
+    touching = np.flatnonzero(structure.touching[:, i])
+    names = ("frames", "tie", "wanted_point", "wanted_force", *(["branch"] if n in SIZES else []))
+    of.bind(
+        touching,
+        kernels.contact(n, limited),
+        {"on_object": (0.0, 0.0), "on_link": (0.0, 0.0), "regular": FREE, **actuated},
+        (c,),
+        f"contact{c}",
+        **_shape(of, i, touching),
+        pose=of.pose.take(touching),
+        point=point.take(touching),
+        force=force.take(touching),
+        angles=of.angles[i].take(touching),
+        friction=of.problem["friction"],
+        **of.scene(c, touching),
+        **of.of(c, touching, *names),
+    )
+    disturbed = np.flatnonzero(structure.active[of.disturbed, i])
+    if len(disturbed):
+        knots = of.disturbed[disturbed]
+        of.bind(
+            knots,
+            kernels.disturbed_contact(n, limited),
+            actuated,
+            (c,),
+            f"disturbed_contact{c}",
+            **_shape(of, i, knots),
+            pose=of.pose.take(knots),
+            point=point.take(knots),
+            angles=of.angles[i].take(knots),
+            force=of.force_disturbed.take(disturbed).entries(3 * i, 3 * i + 3),
+            friction=of.problem["friction"],
+            **of.scene(c, knots),
+            **of.of(c, knots, "frames"),
+        )
+    start = np.flatnonzero(structure.active[:-1, i])
+    scenes = of.scene(c, start), of.scene(c, start + 1)
+    of.bind(
+        start,
+        kernels.rolling(n),
+        {"no_slip": FREE},
+        (c,),
+        f"rolling{c}",
+        **_shape(of, i, start),
+        **{
+            name: (rows.take(start), rows.take(start + 1))
+            for name, rows in (("pose", of.pose), ("point", point), ("angles", of.angles[i]))
+        },
+        **{name: (scenes[0][name], scenes[1][name]) for name in scenes[0]},
+        **of.at(start, "step"),
+        **of.of(c, start, "frames", "helper"),
+    )
+    # Else a finger may be stretched out between knots, or folded, and find itself there on more of them.
+    halves = structure.middles.weights(start)
+    of.bind(
+        start,
+        kernels.actuated(n),
+        {"passive": FREE},
+        (c,),
+        f"inter_knot{c}",
+        **_shape(of, i, start),
+        pose=of.pose.combine(halves),
+        point=point.combine(halves),
+        angles=of.angles[i].combine(halves),
+        force=force.combine(halves),
+        **of.at(start, "reference", "radius"),
+        **of.between(start),
+        **of.of(c, start, "frames", "capsule"),
+    )
+
+
+def _shape(of: Declaration, i: int, knots: Knots) -> dict[str, Rows]:
+    """A finger's morphology, the same at all knots."""
+    return {name: rows.constant(len(knots)) for name, rows in of.shape[i].items()}
+
+
+def bind_clearance(of: Declaration, i: int) -> None:
+    """A finger clear of palm, ground, itself and the object, but for what its last link touches."""
+    structure, model = of.structure, of.structure.model
+    c, n = structure.contacts[i], structure.joints[i]
+    touched = int(np.argmin(np.abs(model.primitives - model.capsules[c]).sum(axis=1)))
+    touching, idle = structure.touching[:, i], np.flatnonzero(~structure.active[:-1, i])
+
+    def bind(
+        kind: str, knots: Knots, moving: dict[str, Rows], palm: dict[str, Parameter], least: float, skipped: int | None
+    ) -> None:
+        of.bind(
+            knots,
+            kernels.apart(n, len(model.primitives), skipped, model.ground is not None),
+            {"clear": (least, np.inf)},
+            (c,),
+            f"{kind}{c}",
+            **_shape(of, i, knots),
+            **moving,
+            **palm,
+            **of.at(knots, "reference", "radius", "palm_radius", "ground_height", "primitives"),
+            **of.of(c, knots, "frames"),
+        )
+
+    for kind, where, skipped in (("apart_touching", touching, touched), ("apart", ~touching, None)):
+        knots = np.flatnonzero(where)
+        if len(knots):
+            moving = {"pose": of.pose.take(knots), "angles": of.angles[i].take(knots)}
+            bind(kind, knots, moving, of.at(knots, "palm_position", "palm_quaternion"), CLEARANCE, skipped)
+    if len(idle):  # a lifted finger is quick, and must not cut through the object's edge between two knots
+        halves = structure.middles.weights(idle)
+        moving = {"pose": of.pose.combine(halves), "angles": of.angles[i].combine(halves)}
+        bind("apart_between", idle, moving, of.between(idle), 0.0, None)
+
+
+def bind_shape(of: Declaration, i: int) -> None:
+    """A finger's morphology, and its joints' motion: mirrored at both ends, so that it starts and ends at rest."""
+    problem, structure, model, count = of.problem, of.structure, of.structure.model, of.knots
+    c, n, speed = structure.contacts[i], structure.joints[i], model.speed_limit
+    inner = np.arange(-1, count + 1)
+    mirrored = np.where(inner < 0, 1, np.where(inner >= count, count - 2, inner))
+    three = [of.angles[i].take(mirrored[offset : offset + count]) for offset in range(3)]
+    steps = of.steps(*(np.clip(np.arange(count) - back, 0, count - 2) for back in (1, 0)))
+    kernel, limits = kernels.joint_motion(n, bool(np.isfinite(speed))), {"speed": (-speed, speed)}
+    of.bind(np.arange(count), kernel, limits, (c,), f"joint_motion{c}", angles=three, step=steps)
+    switches = np.flatnonzero(np.diff(structure.active[:, i].astype(int))) + 1
+    first = np.array([k for k in range(count - 3) if k + 1 not in switches and k + 2 not in switches], int)
+    four = [of.angles[i].take(first + offset) for offset in range(4)]
+    problem.bind(kernels.joint_jerk(n), angles=four, step=of.steps(first, first + 1, first + 2))
+    wanted = of.of(c, first, "wanted_base", "wanted_lengths", "wanted_axes")
+    reach = (model.palm_radius - model.link_radius) ** 2
+    of.bind(None, kernels.stay(n), {"on_palm": (0, reach)}, (c,), f"stay{c}", **of.shape[i], **wanted)
+
+
+def bind_pair(of: Declaration, i: int, j: int, guarded: bool) -> None:
+    """Two fingers clear of each other; ``guarded``: between knots, too."""
+    structure = of.structure
+    c, d = structure.contacts[i], structure.contacts[j]
+
+    def bind(kind: str, knots: Knots, angles: list[Rows], least: float) -> None:
+        shapes = _shape(of, i, knots), _shape(of, j, knots)
+        of.bind(
+            knots,
+            kernels.fingers_apart(structure.joints[i], structure.joints[j]),
+            {"clear": (least, np.inf)},
+            (c, d),
+            f"{kind}{c}_{d}",
+            **{name: (shapes[0][name], shapes[1][name]) for name in shapes[0]},
+            angles=angles,
+            frames=(of.problem[f"frames{c}"], of.problem[f"frames{d}"]),
+            radius=of.problem["radius"],
+        )
+
+    bind("fingers_apart", np.arange(of.knots), [of.angles[k] for k in (i, j)], CLEARANCE)
+    if guarded:
+        inner = structure.inner
+        bind("fingers_between", inner.interval, [of.angles[k].combine(inner.weights()) for k in (i, j)], 0.0)

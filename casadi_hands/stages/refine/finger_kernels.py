@@ -1,0 +1,291 @@
+"""The fingers' blocks of the refine stage: contact, rolling, supply, clearance, all to be met exactly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import casadi as ca
+from casadi import SX
+
+from casadi_hands.geometry import norm
+from casadi_hands.geometry.surface import from_axis, path_between, smooth_surface, tangents
+from casadi_hands.kinematics.singularity import SIZES, regularity
+from casadi_hands.kinematics.symbols import FingerSymbols, PlacedFinger, morphology
+from casadi_hands.motion import conjugate, derivative, rotation_matrix
+from casadi_hands.motion.pose import placed
+from casadi_hands.nlp import Kernel
+from casadi_hands.stages.whole_hand.kernels import distances
+from casadi_hands.terms import clearance, finger
+from casadi_hands.terms import constraints as limits
+
+LEVER = 0.06  # half extents/rad: forces that need a shorter lever than about this count as not supplied
+
+
+def free_morphology(kernel: Kernel, joints: int, place: int | None = None) -> FingerSymbols:
+    """A finger whose morphology is variables: base, lengths, axis coordinates; its seed frames are a parameter."""
+    frames = kernel.parameter("frames" if place is None else f"frames{place}", 9 * joints, "frames", place)
+    return morphology(kernel.variable, frames, joints, place)
+
+
+@dataclass(frozen=True)
+class Touch:
+    """A contact seen from both bodies at one knot; vectors in the palm frame unless said otherwise.
+
+    Attributes:
+        on_link: (3,) the contact in the last link's frame.
+        off_object: signed distance of the contact from the object's surface.
+        off_link: (3,) how far the link's axis is from a link's radius above the object's surface, object frame: zero
+            where surfaces touch with opposed normals, and linear in where the link is, so that none ends up inside.
+        normal: (3,) outward from the object, object frame.
+        link_normal: (3,) outward from the link, link frame.
+        rotation: (3, 3) object axes to palm axes.
+        placed: the finger with the contact as its point.
+    """
+
+    on_link: SX
+    off_object: SX
+    off_link: SX
+    normal: SX
+    link_normal: SX
+    rotation: SX
+    placed: PlacedFinger
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Parameters that place object and palm at one knot."""
+
+    reference: SX
+    palm_position: SX
+    palm_quaternion: SX
+    capsule: SX
+    radius: SX
+
+    @classmethod
+    def declare(cls, kernel: Kernel, place: int | None = None) -> Scene:
+        """Declare them in a kernel, at one of several knots if told so."""
+        names = (("reference", 4), ("palm_position", 3), ("palm_quaternion", 4), ("capsule", 7), ("radius", 1))
+        tag = "" if place is None else str(place)
+        return cls(*[kernel.parameter(name + tag, size, name, place) for name, size in names])
+
+    def touch(self, pose: SX, point: SX, angles: SX, symbols: FingerSymbols) -> Touch:
+        """See a contact point (3,), object frame, from the object and from a finger's last link."""
+        position, quaternion = placed(pose, self.reference)
+        to_palm = rotation_matrix(conjugate(self.palm_quaternion))
+        rotation = ca.mtimes(to_palm, rotation_matrix(quaternion))
+        in_palm = ca.mtimes(rotation, point) + ca.mtimes(to_palm, position - self.palm_position)
+        skeleton = symbols.placed(angles, self.radius)
+        on_link = ca.mtimes(skeleton.tip_rotation.T, in_palm - skeleton.origins[:, -1])
+        off_object, normal = smooth_surface(point, self.capsule[:3], self.capsule[3:6], self.capsule[6])
+        end = ca.vertcat(0, 0, symbols.lengths[-1])
+        from_end = from_axis(on_link, SX.zeros(3, 1), end)
+        from_link = ca.mtimes(rotation.T, ca.mtimes(skeleton.tip_rotation, from_end))
+        from_object = from_axis(point, self.capsule[:3], self.capsule[3:6])
+        off_link = from_link + self.radius / self.capsule[6] * from_object
+        here = symbols.placed(angles, self.radius, on_link)
+        return Touch(on_link, off_object, off_link, normal, from_end / norm(from_end, 1e-6), rotation, here)
+
+
+@cache
+def contact(joints: int, limited: bool) -> Kernel:
+    """One touching contact at one knot: on both surfaces, normals opposed, in the cone, supplied by the joints.
+
+    Constraints: ``on_object`` (1), ``on_link`` (3: surface and normal, see ``Touch``), those of ``_hold`` and, of a
+    finger that has branches, ``regular`` (1: its regularity on the wanted one).
+    The cost of friction is the fourth power of the share in use.
+    """
+    kernel = Kernel("contact")
+    symbols = free_morphology(kernel, joints)
+    pose, point, force = kernel.variable("pose", 6), kernel.variable("point", 3), kernel.variable("force", 3)
+    angles = kernel.variable("angles", joints)
+    scene = Scene.declare(kernel)
+    friction, tie = kernel.parameter("friction"), kernel.parameter("tie")
+    wanted_point, wanted_force = kernel.parameter("wanted_point", 3), kernel.parameter("wanted_force", 3)
+    touch = scene.touch(pose, point, angles, symbols)
+    if joints in SIZES:
+        kernel.constrain(
+            limits.REGULAR, ca.dot(kernel.parameter("branch", SIZES[joints]), regularity(touch.placed.jacobian))
+        )
+    kernel.constrain(limits.ON_OBJECT, touch.off_object)
+    kernel.constrain(limits.ON_LINK, touch.off_link)
+    pressing, across, passive = _hold(kernel, touch, force, friction, limited)
+    kernel.cost("passive_force", passive)
+    kernel.cost("stay_point", tie * (point - wanted_point))
+    kernel.cost("stay_force", force - wanted_force)
+    kernel.cost("friction_margin", across / (friction * pressing + 0.1) ** 2)
+    return kernel
+
+
+@cache
+def disturbed_contact(joints: int, limited: bool) -> Kernel:
+    """A second force of a touching contact at one knot: in the cone, and supplied by the joints, as the first."""
+    kernel = Kernel("disturbed_contact")
+    symbols = free_morphology(kernel, joints)
+    pose, point, angles = kernel.variable("pose", 6), kernel.variable("point", 3), kernel.variable("angles", joints)
+    force = kernel.variable("force", 3)
+    scene, friction = Scene.declare(kernel), kernel.parameter("friction")
+    touch = scene.touch(pose, point, angles, symbols)
+    _, _, passive = _hold(kernel, touch, force, friction, limited, disturbed=True)
+    kernel.cost("passive_force", passive)
+    return kernel
+
+
+@cache
+def actuated(joints: int) -> Kernel:
+    """A contact's force at any time: ``passive`` (3) is what no joint supplies of it."""
+    kernel = Kernel("actuated")
+    symbols = free_morphology(kernel, joints)
+    pose, point, angles = kernel.variable("pose", 6), kernel.variable("point", 3), kernel.variable("angles", joints)
+    force = kernel.variable("force", 3)
+    passive = _passive(Scene.declare(kernel).touch(pose, point, angles, symbols), force)
+    kernel.constrain(limits.ACTUATED, passive)
+    kernel.cost("passive_force", passive)
+    return kernel
+
+
+def _hold(
+    kernel: Kernel, touch: Touch, force: SX, friction: SX, limited: bool, disturbed: bool = False
+) -> tuple[SX, SX, SX]:
+    """Constrain a contact force (3,), object frame; return its normal part, tangential square and passive part.
+
+    Constraints: ``pressing`` (1: normal force), ``cone`` (1: (μ f_n)² - f_t²), ``passive`` (3: force no joint
+    supplies), and where the task limits it ``torque`` (n).
+    """
+    pressing = -ca.dot(force, touch.normal)
+    across = ca.sumsqr(force + pressing * touch.normal)
+    kernel.constrain(limits.DISTURBED_PRESSING if disturbed else limits.PRESSING, pressing)
+    kernel.constrain(limits.DISTURBED_CONE if disturbed else limits.CONE, (friction * pressing) ** 2 - across)
+    passive = _passive(touch, force)
+    kernel.constrain(limits.DISTURBED_ACTUATED if disturbed else limits.ACTUATED, passive)
+    if limited:
+        torque = ca.mtimes(touch.placed.jacobian.T, ca.mtimes(touch.rotation, force))
+        kernel.constrain(limits.DISTURBED_TORQUE if disturbed else limits.WITHIN_TORQUE, torque)
+    return pressing, across, passive
+
+
+def _passive(touch: Touch, force: SX) -> SX:
+    """The part (3,), palm frame, of a contact force, object frame, that no joint supplies."""
+    return finger.unsupplied_force(touch.placed.jacobian, ca.mtimes(touch.rotation, force), LEVER)
+
+
+@cache
+def rolling(joints: int) -> Kernel:
+    """One contact from one knot to the next: its paths over both surfaces agree (no slip), and its spin costs."""
+    kernel = Kernel("rolling")
+    symbols = free_morphology(kernel, joints)
+    poses, points, angles = [], [], []
+    for i in range(2):
+        poses.append(kernel.variable(f"pose{i}", 6, "pose", i))
+        points.append(kernel.variable(f"point{i}", 3, "point", i))
+        angles.append(kernel.variable(f"angles{i}", joints, "angles", i))
+    scenes = [Scene.declare(kernel, i) for i in range(2)]
+    helper, step = kernel.parameter("helper", 3), kernel.parameter("step")
+    before, after = (scenes[i].touch(poses[i], points[i], angles[i], symbols) for i in range(2))
+    turns = before.placed.tip_rotation, after.placed.tip_rotation
+    over_object = path_between(points, (before.normal, after.normal), (before.rotation, after.rotation))
+    over_link = path_between((before.on_link, after.on_link), (before.link_normal, after.link_normal), turns)
+    first, second = (ca.mtimes(before.rotation, t) for t in tangents(before.normal, helper))
+    slip = ca.vertcat(ca.dot(first, over_object - over_link), ca.dot(second, over_object - over_link))
+    kernel.constrain(limits.NO_SLIP, slip)
+    kernel.cost("slip", slip / step)
+    relative_before = ca.mtimes(before.placed.tip_rotation.T, before.rotation)
+    relative_after = ca.mtimes(after.placed.tip_rotation.T, after.rotation)
+    change = ca.mtimes(relative_before.T, relative_after)
+    turned = ca.vertcat(change[2, 1] - change[1, 2], change[0, 2] - change[2, 0], change[1, 0] - change[0, 1]) / 2
+    kernel.cost("spin", ca.dot(turned, before.normal) / step)
+    return kernel
+
+
+@cache
+def apart(joints: int, primitives: int, touched: int | None, grounded: bool) -> Kernel:
+    """One finger clear of palm, ground, itself and the object at one time.
+
+    Args:
+        joints: of the finger.
+        primitives: of the object.
+        touched: the primitive the last link touches, left out; None where it must stay clear of all.
+        grounded: whether there is a ground.
+    """
+    kernel = Kernel("apart")
+    symbols = free_morphology(kernel, joints)
+    pose, angles = kernel.variable("pose", 6), kernel.variable("angles", joints)
+    reference, palm_position, palm_quaternion = (
+        kernel.parameter(n, k) for n, k in (("reference", 4), ("palm_position", 3), ("palm_quaternion", 4))
+    )
+    radius, palm_radius, ground = (
+        kernel.parameter("radius"),
+        kernel.parameter("palm_radius"),
+        kernel.parameter("ground_height"),
+    )
+    shapes = ca.reshape(kernel.parameter("primitives", 7 * primitives), 7, primitives)
+    position, quaternion = placed(pose, reference)
+    to_palm = rotation_matrix(conjugate(palm_quaternion))
+    rotation, center = ca.mtimes(to_palm, rotation_matrix(quaternion)), ca.mtimes(to_palm, position - palm_position)
+    seen = [
+        ca.vertcat(
+            ca.mtimes(rotation, shapes[:3, k]) + center, ca.mtimes(rotation, shapes[3:6, k]) + center, shapes[6, k]
+        )
+        for k in range(primitives)
+    ]
+    here = symbols.placed(angles, radius)
+    up = to_palm[:, 2] if grounded else None
+    clear, last = distances(here, radius, palm_radius, ca.horzcat(*seen), up, ground - palm_position[2])
+    others = [last[k] for k in range(primitives) if k != touched]
+    kernel.constrain(limits.CLEAR, ca.vertcat(clear, *others))
+    return kernel
+
+
+@cache
+def fingers_apart(joints: int, other_joints: int) -> Kernel:
+    """Two fingers clear of each other at one time."""
+    kernel = Kernel("fingers_apart")
+    first = free_morphology(kernel, joints, 0)
+    angles = kernel.variable("angles0", joints, "angles", 0)
+    second = free_morphology(kernel, other_joints, 1)
+    other_angles = kernel.variable("angles1", other_joints, "angles", 1)
+    radius = kernel.parameter("radius")
+    kernel.constrain(
+        limits.CLEAR_OF_EACH_OTHER,
+        clearance.links_and_links(first.placed(angles, radius).ends, second.placed(other_angles, radius).ends, radius),
+    )
+    return kernel
+
+
+@cache
+def joint_motion(joints: int, limited: bool) -> Kernel:
+    """One finger's angles at three knots: smooth, and within the speed limit if there is one."""
+    kernel = Kernel("joint_motion")
+    angles = [kernel.variable(f"angles{i}", joints, "angles", i) for i in range(3)]
+    steps = [kernel.parameter(f"step{i}", 1, "step", i) for i in range(2)]
+    kernel.cost("joint_acceleration", derivative(angles, steps))
+    if limited:
+        kernel.constrain(limits.WITHIN_SPEED, ca.vertcat(*[(angles[i + 1] - angles[i]) / steps[i] for i in range(2)]))
+    return kernel
+
+
+@cache
+def joint_jerk(joints: int) -> Kernel:
+    """How the acceleration of one finger's joints changes over four knots.
+
+    Between knots joints move on smooth curves, which leave the paths that roll where accelerations change abruptly.
+    """
+    kernel = Kernel("joint_jerk")
+    angles = [kernel.variable(f"angles{i}", joints, "angles", i) for i in range(4)]
+    kernel.cost("joint_jerk", derivative(angles, [kernel.parameter(f"step{i}", 1, "step", i) for i in range(3)]))
+    return kernel
+
+
+@cache
+def stay(joints: int) -> Kernel:
+    """A finger's morphology: short, on the palm, and near what the synthesis found."""
+    kernel = Kernel("stay")
+    base, lengths, axes = (
+        kernel.variable("base", 2),
+        kernel.variable("lengths", joints),
+        kernel.variable("axes", 2 * joints),
+    )
+    wanted = [kernel.parameter(f"wanted_{n}", k) for n, k in (("base", 2), ("lengths", joints), ("axes", 2 * joints))]
+    kernel.cost("stay_design", ca.vertcat(base - wanted[0], lengths - wanted[1], axes - wanted[2]))
+    kernel.constrain(limits.ON_PALM, ca.sumsqr(base))
+    return kernel

@@ -1,0 +1,295 @@
+"""The object's blocks of the refine stage: physics between knots, ground, clearance, drawing, all to be met exactly."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import casadi as ca
+from casadi import SX
+from numpy.polynomial.legendre import leggauss
+
+from casadi_hands.geometry import point_disc_distance
+from casadi_hands.geometry.surface import path_between, smooth_surface
+from casadi_hands.motion import conjugate, derivative, multiply, rotation_matrix
+from casadi_hands.motion.pose import placed
+from casadi_hands.nlp import Constraint, Kernel
+from casadi_hands.terms import constraints as limits
+
+# Gauss and Legendre's points and weights, for a step from 0 to 1.
+_GAUSS, _GAUSS_WEIGHTS = (leggauss(3)[0] + 1) / 2, leggauss(3)[1] / 2
+
+
+@cache
+def wrench(contacts: int) -> Kernel:
+    """The contacts' force and torque at a knot, as variables of their own: physics then knows no contacts."""
+    kernel = Kernel("wrench")
+    total = kernel.variable("wrench", 6)
+    points, forces = _contacts(kernel, contacts)
+    kernel.constrain(limits.WRENCH_OF_CONTACTS, ca.vertcat(ca.sum2(forces), _torque(points, forces)) - total)
+    return kernel
+
+
+@cache
+def middle_torque(contacts: int) -> Kernel:
+    """The contacts' torque halfway between two knots, with forces and points linear in the object's frame."""
+    kernel = Kernel("middle_torque")
+    middle = kernel.variable("middle_torque", 3)
+    ends = [_contacts(kernel, contacts, i) for i in range(2)]
+    points, forces = ((ends[0][i] + ends[1][i]) / 2 for i in range(2))
+    kernel.constrain(limits.WRENCH_OF_CONTACTS, _torque(points, forces) - middle)
+    return kernel
+
+
+def _contacts(kernel: Kernel, contacts: int, place: int | None = None) -> tuple[SX, SX]:
+    """Declare the points and forces (3, C) of all contacts, at one of several knots if told so."""
+    tag = "" if place is None else str(place)
+    points, forces = (kernel.variable(name + tag, 3 * contacts, name, place) for name in ("point", "force"))
+    return ca.reshape(points, 3, contacts), ca.reshape(forces, 3, contacts)
+
+
+def _torque(points: SX, forces: SX) -> SX:
+    return sum((ca.cross(points[:, i], forces[:, i]) for i in range(points.shape[1])), SX.zeros(3, 1))
+
+
+@cache
+def physics() -> Kernel:
+    """Newton–Euler from one knot to the next; forces and contact points linear in the object's frame.
+
+    The force is then linear in time and the torque quadratic: both ends and the middle say all of it. Orientation and
+    spin between the knots are those of the quintic that has their values and first two derivatives at both, and
+    accelerations are integrated over these by Gauss: sixth order in the step.
+    """
+    kernel = Kernel("physics")
+    states = [(kernel.variable(f"pose{i}", 6, "pose", i), kernel.variable(f"rate{i}", 6, "rate", i)) for i in range(2)]
+    wrenches = [kernel.variable(f"wrench{i}", 6, "wrench", i) for i in range(2)]
+    middle = kernel.variable("middle_torque", 3)
+    reference, step = kernel.parameter("reference", 4), kernel.parameter("step")
+    gravity, inertial = kernel.parameter("gravity", 3), kernel.parameter("inertial")
+    inertia = ca.reshape(kernel.parameter("inertia", 9), 3, 3)
+    inverse = ca.reshape(kernel.parameter("inverse", 9), 3, 3)
+    (torque0, torque1), change = (wrench[3:] for wrench in wrenches), wrenches[1][3:] - wrenches[0][3:]
+    bend = 2 * (torque0 + torque1) - 4 * middle
+
+    def angular(omega: SX, s: float) -> SX:
+        torque = torque0 + s * change + s * (s - 1) * bend
+        return ca.mtimes(inverse, torque / inertial - ca.cross(omega, ca.mtimes(inertia, omega)))
+
+    def turning(quaternion: SX, omega: SX) -> SX:
+        return multiply(quaternion, ca.vertcat(0, omega)) / 2
+
+    turns, spins = [], []  # value, derivative and second derivative at both knots, by the share of the step
+    for i, (pose, rate) in enumerate(states):
+        (_, quaternion), omega = placed(pose, reference), rate[3:]
+        alpha = step * angular(omega, i)
+        gyration = ca.cross(alpha, ca.mtimes(inertia, omega)) + ca.cross(omega, ca.mtimes(inertia, alpha))
+        jerk = step * ca.mtimes(inverse, (change + (2 * i - 1) * bend) / inertial - gyration)
+        turn = step * turning(quaternion, omega)
+        turns.append((quaternion, turn, step * (turning(turn, omega) + turning(quaternion, alpha))))
+        spins.append((omega, alpha, jerk))
+    moved, sped, turned, spun = SX.zeros(3, 1), SX.zeros(3, 1), turns[0][0], SX.zeros(3, 1)
+    for s, weight in zip(_GAUSS.tolist(), _GAUSS_WEIGHTS.tolist(), strict=True):
+        quaternion, omega = (_quintic(start, end, s) for start, end in (turns, spins))
+        force = (1 - s) * wrenches[0][:3] + s * wrenches[1][:3]
+        acceleration = (ca.mtimes(rotation_matrix(quaternion), force) + gravity) / inertial
+        sped += weight * step * acceleration
+        moved += weight * (1 - s) * step**2 * acceleration
+        turned += weight * step * turning(quaternion, omega)
+        spun += weight * step * angular(omega, s)
+    (before, rate0), (after, rate1) = states
+    kernel.cost("object_acceleration", (rate1 - rate0) / step)
+    off = (
+        after[:3] - before[:3] - step * rate0[:3] - moved,
+        2 * multiply(conjugate(turned), turns[1][0])[1:],
+        rate1 - rate0 - ca.vertcat(sped, spun),
+    )
+    kernel.constrain(limits.DEFECT, ca.vertcat(*off))
+    return kernel
+
+
+def _quintic(start: tuple[SX, SX, SX], end: tuple[SX, SX, SX], s: float) -> SX:
+    """At a share s of the step, the polynomial with given value, derivative and second derivative at both ends."""
+    r = 1 - s
+    return (
+        r**3 * (1 + 3 * s + 6 * s**2) * start[0]
+        + s**3 * (1 + 3 * r + 6 * r**2) * end[0]
+        + r**3 * s * (1 + 3 * s) * start[1]
+        - s**3 * r * (1 + 3 * r) * end[1]
+        + (r**3 * s**2 * start[2] + s**3 * r**2 * end[2]) / 2
+    )
+
+
+@cache
+def disturbed(contacts: int) -> Kernel:
+    """Second forces at a knot that, with an external push, make the same wrench as the first ones alone."""
+    kernel = Kernel("disturbed")
+    pose, total = kernel.variable("pose", 6), kernel.variable("wrench", 6)
+    points, forces = _contacts(kernel, contacts)
+    names = (("reference", 4), ("external_force", 3), ("external_torque", 3))
+    reference, force, torque = (kernel.parameter(n, k) for n, k in names)
+    _, quaternion = placed(pose, reference)
+    to_object = rotation_matrix(conjugate(quaternion))
+    push = ca.vertcat(ca.mtimes(to_object, force), ca.mtimes(to_object, torque))
+    kernel.constrain(limits.DISTURBED_WRENCH, ca.vertcat(ca.sum2(forces), _torque(points, forces)) + push - total)
+    kernel.cost("force_regularisation", forces)
+    return kernel
+
+
+@cache
+def equilibrium() -> Kernel:
+    """The contacts' wrench that holds the object still at one knot: a motion starts and ends without a jolt."""
+    kernel = Kernel("equilibrium")
+    pose, total = kernel.variable("pose", 6), kernel.variable("wrench", 6)
+    reference, gravity = kernel.parameter("reference", 4), kernel.parameter("gravity", 3)
+    _, quaternion = placed(pose, reference)
+    kernel.constrain(
+        limits.EQUILIBRIUM, ca.vertcat(ca.mtimes(rotation_matrix(quaternion), total[:3]) + gravity, total[3:])
+    )
+    return kernel
+
+
+@cache
+def object_jerk() -> Kernel:
+    """How the object's acceleration changes over three knots.
+
+    Without it a motion that starts still reaches its full acceleration in one step, which joints cannot follow.
+    """
+    kernel = Kernel("object_jerk")
+    rates = [kernel.variable(f"rate{i}", 6, "rate", i) for i in range(3)]
+    kernel.cost("object_jerk", derivative(rates, [kernel.parameter(f"step{i}", 1, "step", i) for i in range(2)]))
+    return kernel
+
+
+@cache
+def force_change(contacts: int) -> Kernel:
+    """Change of the contact forces from one knot to the next."""
+    kernel = Kernel("force_change")
+    before, after = (kernel.variable(f"force{i}", 3 * contacts, "force", i) for i in range(2))
+    kernel.cost("force_change", after - before)
+    return kernel
+
+
+@cache
+def stay_on_path() -> Kernel:
+    """The object near the motion of the whole-hand stage at one knot."""
+    kernel = Kernel("stay_path")
+    pose, wanted = kernel.variable("pose", 6), kernel.parameter("wanted_pose", 6)
+    kernel.cost("stay_path", pose - wanted)
+    return kernel
+
+
+@cache
+def meet_goal() -> Kernel:
+    """The object's distance (6,) from a goal; the tolerance is there for where it is needed, not to be used up."""
+    kernel = Kernel("meet_goal")
+    pose, wanted = kernel.variable("pose", 6), kernel.parameter("goal_pose", 6)
+    kernel.cost("goal", pose - wanted)
+    return kernel
+
+
+@cache
+def ground_contact() -> Kernel:
+    """The object's contact with the ground at one knot; the ground's normal is the world's z.
+
+    Constraints: ``on_surfaces`` (2: off the object, off the ground), ``opposed`` (2), ``facing`` (1), ``pressing``
+    (1) and ``cone`` (1), as a finger's contact has them.
+    """
+    kernel = Kernel("ground")
+    pose, point, force = kernel.variable("pose", 6), kernel.variable("point", 3), kernel.variable("force", 3)
+    reference, capsule = kernel.parameter("reference", 4), kernel.parameter("capsule", 7)
+    height, friction = kernel.parameter("ground_height"), kernel.parameter("friction")
+    wanted_point, wanted_force = kernel.parameter("wanted_point", 3), kernel.parameter("wanted_force", 3)
+    position, quaternion = placed(pose, reference)
+    rotation = rotation_matrix(quaternion)
+    off_object, normal = smooth_surface(point, capsule[:3], capsule[3:6], capsule[6])
+    outward, exerted = ca.mtimes(rotation, normal), ca.mtimes(rotation, force)
+    above = position[2] + ca.dot(rotation[2, :].T, point) - height
+    kernel.constrain(limits.ON_SURFACES, ca.vertcat(off_object, above))
+    kernel.constrain(limits.OPPOSED, outward[:2])
+    kernel.constrain(limits.FACING, outward[2])
+    _hold(kernel, exerted, friction, (limits.GROUND_PRESSING, limits.GROUND_CONE))
+    kernel.cost("stay_point", point - wanted_point)
+    kernel.cost("stay_force", force - wanted_force)
+    return kernel
+
+
+@cache
+def disturbed_ground() -> Kernel:
+    """A second force in the ground's cone at one knot."""
+    kernel = Kernel("disturbed_ground")
+    pose, force = kernel.variable("pose", 6), kernel.variable("force", 3)
+    reference, friction = kernel.parameter("reference", 4), kernel.parameter("friction")
+    _, quaternion = placed(pose, reference)
+    declared = limits.DISTURBED_GROUND_PRESSING, limits.DISTURBED_GROUND_CONE
+    _hold(kernel, ca.mtimes(rotation_matrix(quaternion), force), friction, declared)
+    return kernel
+
+
+def _hold(kernel: Kernel, exerted: SX, friction: SX, declared: tuple[Constraint, Constraint]) -> None:
+    """Constrain the ground's force (3,) on the object, world: ``pressing`` (1) and ``cone`` (1: (μ f_n)² - f_t²)."""
+    kernel.constrain(declared[0], exerted[2])
+    kernel.constrain(declared[1], (friction * exerted[2]) ** 2 - ca.sumsqr(exerted[:2]))
+
+
+@cache
+def ground_rolling() -> Kernel:
+    """The object's contact with the ground from one knot to the next: it rolls or stands, and does not slip."""
+    kernel = Kernel("ground_rolling")
+    ends = [(kernel.variable(f"pose{i}", 6, "pose", i), kernel.variable(f"point{i}", 3, "point", i)) for i in range(2)]
+    reference, capsule, step = (
+        kernel.parameter("reference", 4),
+        kernel.parameter("capsule", 7),
+        kernel.parameter("step"),
+    )
+    points, normals, rotations, world = [], [], [], []
+    for pose, point in ends:
+        position, quaternion = placed(pose, reference)
+        points.append(point)
+        normals.append(smooth_surface(point, capsule[:3], capsule[3:6], capsule[6])[1])
+        rotations.append(rotation_matrix(quaternion))
+        world.append(position + ca.mtimes(rotations[-1], point))
+    slip = (path_between(points, normals, rotations) - world[1] + world[0])[:2]
+    kernel.constrain(limits.GROUND_NO_SLIP, slip)
+    kernel.cost("slip", slip / step)
+    return kernel
+
+
+@cache
+def object_apart(primitives: int, grounded: bool) -> Kernel:
+    """The object clear of the palm, and above the ground if there is one, at one knot."""
+    kernel = Kernel("object_apart")
+    pose = kernel.variable("pose", 6)
+    reference, palm_position, palm_quaternion = (
+        kernel.parameter(n, k) for n, k in (("reference", 4), ("palm_position", 3), ("palm_quaternion", 4))
+    )
+    palm_radius, ground = kernel.parameter("palm_radius"), kernel.parameter("ground_height")
+    shapes = ca.reshape(kernel.parameter("primitives", 7 * primitives), 7, primitives)
+    position, quaternion = placed(pose, reference)
+    rotation, to_palm = rotation_matrix(quaternion), rotation_matrix(conjugate(palm_quaternion))
+    palm, above = [], []
+    for k in range(primitives):
+        start, end = (position + ca.mtimes(rotation, shapes[i : i + 3, k]) for i in (0, 3))
+        for point in (start, (start + end) / 2, end):
+            seen = ca.mtimes(to_palm, point - palm_position)
+            palm.append(point_disc_distance(seen, palm_radius) - shapes[6, k])
+        above += [point[2] - shapes[6, k] - ground for point in (start, end)]
+    kernel.constrain(limits.CLEAR_OF_PALM, ca.vertcat(*palm))
+    if grounded:
+        kernel.constrain(limits.ABOVE_GROUND, ca.vertcat(*above))
+    return kernel
+
+
+@cache
+def tool_point() -> Kernel:
+    """How far (3,) the object's tool is from where it must be at one knot of a drawing."""
+    kernel = Kernel("tool_point")
+    pose = kernel.variable("pose", 6)
+    reference, tool, target = (
+        kernel.parameter("reference", 4),
+        kernel.parameter("tool", 3),
+        kernel.parameter("target", 3),
+    )
+    position, quaternion = placed(pose, reference)
+    off = position + ca.mtimes(rotation_matrix(quaternion), tool) - target
+    kernel.constrain(limits.ON_PATH, off)
+    kernel.cost("goal", off)
+    return kernel

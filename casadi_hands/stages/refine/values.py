@@ -1,0 +1,228 @@
+"""What a refine problem is solved with: bounds, parameters, and the values that it starts from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from casadi_hands.geometry import nearest_on_axis
+from casadi_hands.kinematics.singularity import REGULAR, SIZES, branches
+from casadi_hands.motion import continuous
+from casadi_hands.problem.hand_motion import WholeHand
+from casadi_hands.problem.model import Model
+from casadi_hands.problem.placement import contact_jacobians
+from casadi_hands.stages.object_motion.values import MOST_FORCE, MOST_TURN, tool_path
+from casadi_hands.stages.refine.initial_guess import balanced, perturbations, rates_and_wrenches
+from casadi_hands.stages.refine.problem import RefineProblem
+
+Array = NDArray[np.float64]
+EASED = 0.5  # s over which a contact that touches or lifts comes to press with its full force, or to let go
+TOOL_TOLERANCE = 5e-3  # half extents, how far a drawing's tool may leave its path between goals
+LIFTING_TIE = 2.0  # of a contact to where it was planned, where it lets go in order to touch elsewhere
+SLIDING_TIE = 0.3  # of a contact to where it was planned to slide; it shall roll if it can
+ROUGHLY = 10.0  # times of what no joint may supply at knots may be so between them, where motions are interpolated
+Bounds = dict[str, tuple[ArrayLike, ArrayLike]]
+
+
+@dataclass(frozen=True)
+class Margin:
+    """How far inside its limits a motion must stay; exact motions can still balance on a fingertip.
+
+    Attributes:
+        friction: share of μ that may be used.
+        normal_force: least normal force of an active contact, m·g.
+        passive: largest component of a force that no joint supplies, m·g.
+    """
+
+    friction: float = 0.5
+    normal_force: float = 1.0
+    passive: float = 0.0075
+
+
+class RefineValues:
+    """The numbers of one structure's problem, for any motion to start from and any margin.
+
+    Args:
+        built: the problem.
+        model: the task that it was built for, or one that differs in its goals only.
+    """
+
+    def __init__(self, built: RefineProblem, model: Model) -> None:
+        self.structure, self.model, self.proximity = built.structure, model, built.proximity
+        self.problem, self.disturbed, self.knots = built.problem, built.disturbed, built.knots
+        # A contact that touches anew bears nothing until it does: its force grows from zero.
+        self._active = active = self.structure.active
+        self.bearing = active & np.vstack([active[:1], active[:-1]])
+
+    def constraint_bounds(self, margin: Margin) -> tuple[Bounds, Bounds]:
+        """Bounds of constraints: those that hold in every solve, and those of the exact one.
+
+        Contact and rolling are met within a small part of the task's limits. Where joints have one freedom less than
+        the motion needs, or a motion in a plane meets some of them twice, equations would have no solver's solution.
+        """
+        structure, model, times = self.structure, self.model, self.model.schedule.samples
+        always: Bounds = {}
+        exact: Bounds = {}
+        for i, c in enumerate(structure.contacts):
+            floor = margin.normal_force * eased_in(self.bearing[:, i], times)[structure.touching[:, i]]
+            always[f"contact{c}.pressing"] = (floor[:, None], np.inf)
+            # The point stays on the object's surface, where its force acts; the link may be a little off it.
+            exact[f"contact{c}.on_link"] = (-model.gap_tolerance, model.gap_tolerance)
+            slip = self._slip_allowed(i)
+            exact[f"rolling{c}.no_slip"] = (-slip, slip)
+            for block, factor in (("contact", 1.0), ("disturbed_contact", 1.0), ("inter_knot", ROUGHLY)):
+                if f"{block}{c}.passive" in self.problem.constraint_rows:
+                    exact[f"{block}{c}.passive"] = (-factor * margin.passive, factor * margin.passive)
+        if structure.grounded:
+            slip = self._slip_allowed(-1)
+            exact["ground_rolling.no_slip"] = (-slip, slip)
+        if model.tool is not None:
+            tolerance = np.full((self.knots, 3), TOOL_TOLERANCE)
+            tolerance[model.schedule.goal_samples] = model.goal_tolerance[0]
+            always["tool_point.on_path"] = (-tolerance, tolerance)
+        return always, exact
+
+    def regular(self, motion: WholeHand) -> tuple[dict[str, ArrayLike], Bounds]:
+        """Parameters and bounds that keep each finger on the branch that a motion is on, nearly all of the time."""
+        structure = self.structure
+        parameters: dict[str, ArrayLike] = {}
+        bounds: Bounds = {}
+        for i, (c, n) in enumerate(zip(structure.contacts, structure.joints, strict=True)):
+            if n in SIZES:
+                touching = structure.touching[:, i]
+                branch = branches(contact_jacobians(self.model, motion, i), structure.active[:, i], touching)
+                parameters[f"branch{c}"] = branch
+                kept = np.abs(branch[touching]).sum(axis=1) > 0
+                bounds[f"contact{c}.regular"] = (np.where(kept, REGULAR, -np.inf)[:, None], np.inf)
+        return parameters, bounds
+
+    def _slip_allowed(self, column: int) -> Array:
+        """Share (K, 1) of the slip tolerance, by length, of each interval in which a contact touches."""
+        lengths, active = np.diff(self.model.schedule.samples), self.structure.active[:-1, column]
+        share = lengths[active] / longest_run(active, lengths)
+        return np.asarray(self.model.slip_tolerance / np.sqrt(2) * share[:, None])
+
+    def bounds(self) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Lower and upper bounds of variables: goals, rest at both ends, no force where there is no contact."""
+        model, schedule = self.model, self.model.schedule
+        count = len(schedule.samples)
+        pose = np.tile([np.inf] * 3 + [MOST_TURN] * 3, (count, 1))
+        low_pose, high_pose = -pose, pose
+        if model.tool is None:
+            goals = model.goal_poses
+            at, tolerance = schedule.goal_samples, np.repeat(model.goal_tolerance, 3)
+            low_pose[at], high_pose[at] = goals - tolerance, goals + tolerance
+        rate = np.full((count, 6), np.inf)
+        rate[[0, -1]] = 0.0
+        bearing, active = (np.repeat(np.where(f, MOST_FORCE, 0.0), 3, axis=1) for f in (self.bearing, self._active))
+        upper = {"rate": rate, "force": bearing}
+        if len(self.disturbed):
+            # A perturbation may begin with a touch, and what it is held with is no force that has to grow.
+            upper["force_disturbed"] = active[self.disturbed]
+        lower = {name: -bound for name, bound in upper.items()}
+        return {"pose": low_pose, **lower}, {"pose": high_pose, **upper}
+
+    def start(self, motion: WholeHand) -> dict[str, Array]:
+        """Values of all variables: the motion, with velocities and forces that nearly obey it."""
+        count, chosen = self.knots, self.structure.columns
+        rates, wrenches = rates_and_wrenches(self.model, motion.position, motion.vector)
+        points = motion.point[:, chosen]
+        forces = balanced(points, motion.force[:, chosen], self.bearing, wrenches)
+        values = {
+            "pose": np.hstack([motion.position, motion.vector]),
+            "rate": rates,
+            "point": points.reshape(count, -1),
+            "force": forces.reshape(count, -1),
+            "wrench": np.hstack([forces.sum(axis=1), np.cross(points, forces).sum(axis=1)]),
+        }
+        at, pushing = ((a[1:] + a[:-1]) / 2 for a in (points, forces))
+        values["middle_torque"] = np.cross(at, pushing).sum(axis=1)
+        if len(k := self.disturbed):
+            needed = wrenches[k] - perturbations(self.model, motion.vector)[k]
+            disturbed = balanced(points[k], forces[k], self._active[k], needed)
+            values["force_disturbed"] = disturbed.reshape(len(k), -1)
+        for c, finger, angles in zip(self.structure.contacts, motion.fingers, motion.angles, strict=True):
+            values |= {f"angles{c}": angles, f"base{c}": finger.base, f"lengths{c}": finger.lengths}
+            values[f"axes{c}"] = finger.axes.reshape(1, -1)
+        return values
+
+    def parameters(self, motion: WholeHand, margin: Margin, wanted: WholeHand | None = None) -> dict[str, ArrayLike]:
+        """Values of all parameters but the weights; costs hold a motion near to the wanted one, by default itself."""
+        model, wanted = self.model, wanted or motion
+        halves = self.structure.middles.weights()
+        quaternion = halves @ continuous(motion.palm_quaternion)
+        values: dict[str, ArrayLike] = {
+            "reference": model.reference,
+            "gravity": model.gravity,
+            "inertial": model.units.inertial,
+            "inertia": model.inertia.reshape(1, 9),
+            "inverse": np.linalg.inv(model.inertia).reshape(1, 9),
+            "radius": model.link_radius,
+            "palm_radius": model.palm_radius,
+            "ground_height": model.ground_height,
+            "friction": margin.friction * model.friction,
+            "primitives": model.primitives.reshape(1, -1),
+            "step": np.diff(model.schedule.samples)[:, None],
+            "palm_position": motion.palm_position,
+            "palm_quaternion": motion.palm_quaternion,
+            "palm_position_between": halves @ motion.palm_position,
+            "palm_quaternion_between": quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True),
+            "wanted_pose": np.hstack([wanted.position, wanted.vector]),
+        }
+        values |= self.proximity.idle
+        if len(self.disturbed):
+            values["external_force"] = model.disturbance_force[self.disturbed]
+            values["external_torque"] = model.disturbance_torque[self.disturbed]
+        if model.tool is None:
+            values["goals"] = model.goal_poses
+        else:
+            values["tool"], values["tool_path"] = model.tool, tool_path(model)
+        if self.structure.grounded and model.ground is not None:
+            values["ground_friction"] = margin.friction * model.ground.friction
+            values[f"capsule{model.contacts}"] = model.ground.capsule
+        for c in self.structure.columns:
+            values[f"wanted_point{c}"], values[f"wanted_force{c}"] = wanted.point[:, c], wanted.force[:, c]
+        for c, finger in zip(self.structure.contacts, wanted.fingers, strict=True):
+            if finger.joints in SIZES:
+                values[f"branch{c}"] = 0.0
+            values[f"frames{c}"] = finger.frames.transpose(0, 2, 1).reshape(1, -1)
+            values[f"wanted_base{c}"], values[f"wanted_lengths{c}"] = finger.base, finger.lengths
+            values[f"wanted_axes{c}"] = finger.axes.reshape(1, -1)
+            values[f"capsule{c}"] = model.capsules[c]
+            values[f"tie{c}"] = SLIDING_TIE if model.slides(c) else LIFTING_TIE if model.lifts(c) else 1.0
+            values[f"helper{c}"] = _helpers(motion.point[:, c], model.capsules[c])
+        return values
+
+
+def eased_in(bearing: NDArray[np.bool_], times: Array) -> Array:
+    """Share (S,) of the normal force asked of a contact at times (S,): it grows after a touch, falls before a lift."""
+    if bearing.all():
+        return np.ones(len(bearing))
+    away = np.abs(times[:, None] - times[~bearing]).min(axis=1)
+    return np.asarray(np.minimum(away / EASED, 1.0))
+
+
+def longest_run(flags: NDArray[np.bool_], lengths: Array) -> float:
+    """Longest stretch of intervals (K,) with set flags, in all of their lengths; 0 where none is set."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
+    passed = np.append(0.0, np.cumsum(lengths))
+    return float((passed[edges[1::2]] - passed[edges[::2]]).max(initial=0.0))
+
+
+def _helpers(points: Array, capsule: Array) -> Array:
+    """Vectors (S, 3) well across the surface normal at each contact point, continuous along the motion."""
+    along = capsule[3:6] - capsule[:3]
+    helper = along / np.linalg.norm(along) if np.linalg.norm(along) > 1e-9 else np.eye(3)[0]
+    helpers = []
+    for point in points:
+        _, normal = nearest_on_axis(point, capsule)
+        normal = normal / np.linalg.norm(normal)
+        across = helper - (helper @ normal) * normal
+        if np.linalg.norm(across) < 0.5:
+            across = np.eye(3)[np.argmin(np.abs(normal))]
+            across = across - (across @ normal) * normal
+        helper = across / np.linalg.norm(across)
+        helpers.append(helper)
+    return np.array(helpers)

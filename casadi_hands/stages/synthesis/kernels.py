@@ -1,0 +1,111 @@
+"""The fingers' blocks of the synthesis: Table 2.2."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from casadi_hands.kinematics.symbols import morphology, tip_point
+from casadi_hands.nlp import Kernel
+from casadi_hands.terms import clearance, finger
+
+Array = NDArray[np.float64]
+
+
+@cache
+def follow(joints: int) -> Kernel:
+    """One finger at one keyframe: eq. 2.18, 2.23, 2.24 and 2.27."""
+    kernel = Kernel("follow")
+    frames = kernel.parameter("frames", 9 * joints)
+    symbols = morphology(kernel.variable, frames, joints)
+    angles, tip = kernel.variable("angles", joints), kernel.variable("tips", 2)
+    target, force, active, radius, lowest, highest = (
+        kernel.parameter(name, size)
+        for name, size in (
+            ("target", 3),
+            ("force", 3),
+            ("active", 1),
+            ("link_radius", 1),
+            ("lowest", 1),
+            ("highest", 1),
+        )
+    )
+    point, _ = tip_point(tip, symbols.lengths[-1], radius)
+    placed = symbols.placed(angles, radius, point)
+    kernel.cost("tip_target", active * (placed.contact - target))
+    kernel.cost("null_space", active * finger.null_space(placed.jacobian, force), "sum")
+    kernel.cost("torque", active * finger.joint_torques(placed.jacobian, force))
+    kernel.cost("joint_limits", finger.beyond_limits(angles, lowest, highest), "sum")
+    return kernel
+
+
+@cache
+def build(joints: int) -> Kernel:
+    """One finger's shape: eq. 2.21, 2.22 and 2.25."""
+    kernel = Kernel("build")
+    base, lengths = kernel.variable("base", 2), kernel.variable("lengths", joints)
+    palm_radius, radius, shortest, longest = (
+        kernel.parameter(n) for n in ("palm_radius", "link_radius", "shortest", "longest")
+    )
+    kernel.cost("length", lengths)
+    kernel.cost("minimum_length", finger.beyond_limits(lengths, shortest, longest), "sum")
+    kernel.cost("finger_base", finger.off_palm(base, palm_radius - radius), "sum")
+    return kernel
+
+
+@cache
+def collide(joints: int, primitives: int) -> Kernel:
+    """One finger against object, palm, ground and itself at one time (eq. 2.20)."""
+    kernel = Kernel("collide")
+    frames = kernel.parameter("frames", 9 * joints)
+    symbols = morphology(kernel.variable, frames, joints)
+    angles = kernel.variable("angles", joints)
+    radius, palm_radius, margin = (kernel.parameter(name) for name in ("link_radius", "palm_radius", "margin"))
+    shapes = ca.reshape(kernel.parameter("primitives", 7 * primitives), 7, primitives)
+    up, ground = kernel.parameter("up", 3), kernel.parameter("ground")
+    ends = symbols.placed(angles, radius).ends
+    apart = [
+        clearance.links_and_palm(ends, radius, palm_radius),
+        clearance.links_and_ground(ends, radius, up, ground),
+        clearance.links_of_one(ends, radius),
+    ]
+    if joints > 1:
+        apart.append(clearance.links_and_object(ends[:-1], radius, shapes))
+    touching = clearance.links_and_object(ends[-1:], radius, shapes)
+    kernel.cost("collision", clearance.overlap(ca.vertcat(margin - ca.vertcat(*apart), -touching)), "sum")
+    return kernel
+
+
+@cache
+def keep_apart(joints: int, other_joints: int) -> Kernel:
+    """Two fingers against each other at one time (eq. 2.20)."""
+    kernel = Kernel("keep_apart")
+    frames = kernel.parameter("frames0", 9 * joints, "frames", 0)
+    other_frames = kernel.parameter("frames1", 9 * other_joints, "frames", 1)
+    first = morphology(kernel.variable, frames, joints, 0)
+    angles = kernel.variable("angles0", joints, "angles", 0)
+    second = morphology(kernel.variable, other_frames, other_joints, 1)
+    other_angles = kernel.variable("angles1", other_joints, "angles", 1)
+    radius, margin = kernel.parameter("link_radius"), kernel.parameter("margin")
+    ends = first.placed(angles, radius).ends, second.placed(other_angles, radius).ends
+    distances = clearance.links_and_links(*ends, radius)
+    kernel.cost("collision", clearance.overlap(margin - distances), "sum")
+    return kernel
+
+
+@cache
+def travel(joints: int) -> Kernel:
+    """A fingertip's acceleration at a keyframe where it touches nothing (eq. 2.26)."""
+    kernel = Kernel("travel")
+    frames = kernel.parameter("frames", 9 * joints)
+    symbols = morphology(kernel.variable, frames, joints)
+    # Wherever it stands: only how its tip moves counts.
+    before, now, after = (
+        symbols.placed(kernel.variable(f"angles{i}", joints, "angles", i), ca.SX(0)).tip for i in range(3)
+    )
+    acceleration = finger.tip_acceleration(before, now, after, kernel.parameter("idle_step"))
+    kernel.cost("fingertip_acceleration", acceleration)
+    return kernel

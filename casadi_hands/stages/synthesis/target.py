@@ -1,0 +1,135 @@
+"""What fingers must follow: a floating motion seen from the palm, nondimensional."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from casadi_hands.geometry.contact_points import inward_normals, on_capsules
+from casadi_hands.motion import catmull_rom, linear
+from casadi_hands.problem.floating_motion import Floating
+from casadi_hands.problem.model import Model, palm_from_world
+from casadi_hands.problem.palm_motion import added_to_spline
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Target:
+    """Contacts, forces and the object's pose in the palm frame at the keyframes.
+
+    Attributes:
+        times: (N,) s.
+        points: (N, C, 3) on the object's surface.
+        normals: (N, C, 3) into the object.
+        forces: (N, C, 3) on the object, m·g.
+        centers: (N, 3) the object's centre of mass.
+        active: (N, C) bool.
+        pose: (N, 6) of the object in the world, as the floating stage has it.
+        model: the task.
+    """
+
+    times: Array
+    points: Array
+    normals: Array
+    forces: Array
+    centers: Array
+    active: NDArray[np.bool_]
+    pose: Array
+    model: Model
+
+    @property
+    def palm_radius(self) -> float:
+        """Of the disc, half extents."""
+        return self.model.palm_radius
+
+    @property
+    def link_radius(self) -> float:
+        """Of every link, half extents."""
+        return self.model.link_radius
+
+    @property
+    def link_length(self) -> tuple[float, float]:
+        """Shortest and longest, half extents."""
+        return self.model.link_length
+
+    @property
+    def joint_limits(self) -> tuple[float, float]:
+        """Lower and upper, rad."""
+        return self.model.joint_limits
+
+    @property
+    def primitive_count(self) -> int:
+        """Number of the object's capsules."""
+        return len(self.model.primitives)
+
+    @property
+    def tip_arc(self) -> float:
+        """How far along the fingertip's surface a contact may be from the cap's pole."""
+        return self.link_radius * np.pi / 2 + 0.3 * self.link_length[0]
+
+    def string_of(self, contact: int) -> NDArray[np.int64]:
+        """For each keyframe (N,) the string of a contact's active keyframes it belongs to."""
+        return string_of(self.active[:, contact])
+
+    def strings(self, contact: int) -> int:
+        """Number of strings of a contact, at least 1."""
+        return int(self.string_of(contact).max()) + 1
+
+    def collision_times(self, between: int) -> Array:
+        """The keyframes with ``between`` more times in each gap, s."""
+        return self.model.schedule.between(between)
+
+    def scene(self, times: Array) -> tuple[Array, Array, Array]:
+        """The object's capsules (T, 7K), the ground's normal (T, 3) and its offset (T,) in the palm frame."""
+        model = self.model
+        added = linear(model.schedule.samples, times) @ added_to_spline(model, 0)
+        poses = catmull_rom(self.times, times) @ self.pose + added
+        primitives, up, offset = [], [], []
+        for time, pose in zip(times, poses, strict=True):
+            rotation, position = palm_from_world(model, time)
+            turn = rotation @ pin.exp3(pose[3:]) @ pin.Quaternion(*model.reference).matrix()
+            center = rotation @ (pose[:3] - position)
+            moved = [np.concatenate([turn @ c[:3] + center, turn @ c[3:6] + center, c[6:]]) for c in model.primitives]
+            primitives.append(np.concatenate(moved))
+            up.append(rotation[:, 2])
+            offset.append(model.ground_height - position[2])
+        return np.array(primitives), np.array(up), np.array(offset)
+
+
+def string_of(active: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """For each keyframe (N,) of one contact its string of active keyframes; idle ones count with the next string."""
+    starts = active & ~np.concatenate([[False], active[:-1]])
+    strings = np.cumsum(starts) - 1
+    return np.clip(np.where(active, strings, strings + 1), 0, max(int(starts.sum()) - 1, 0))
+
+
+def target_of(model: Model, floating: Floating) -> Target:
+    """See a floating motion from the palm; contact points are moved onto the object's surface."""
+    schedule, contacts = model.schedule, model.contacts
+    points, normals, forces, centers = [], [], [], []
+    for k, sample in enumerate(schedule.keyframe_samples):
+        rotation, position = palm_from_world(model, schedule.keyframes[k])
+        pose = floating.pose[k]
+        turn = rotation @ pin.exp3(pose[3:]) @ pin.Quaternion(*model.reference).matrix()
+        inward = inward_normals(floating.point[k, :contacts], model.capsules)
+        on_surface = on_capsules(floating.point[k, :contacts], model.capsules)
+        center = rotation @ (pose[:3] - position)
+        force = floating.force[sample, :contacts] * floating.active[k, :contacts, None]
+        points.append(on_surface @ turn.T + center)
+        normals.append(inward @ turn.T)
+        forces.append(force @ turn.T)
+        centers.append(center)
+    return Target(
+        times=schedule.keyframes,
+        points=np.array(points),
+        normals=np.array(normals),
+        forces=np.array(forces),
+        centers=np.array(centers),
+        active=floating.active[:, :contacts],
+        pose=floating.pose,
+        model=model,
+    )

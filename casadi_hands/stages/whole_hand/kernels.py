@@ -1,0 +1,138 @@
+"""The fingers' blocks of the whole-hand stage, one finger or two at one sample, and the palm's; all are costs."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import casadi as ca
+from casadi import SX
+
+from casadi_hands.geometry import project_to_capsule
+from casadi_hands.kinematics.symbols import FingerSymbols, PlacedFinger, morphology
+from casadi_hands.motion import rotation_matrix
+from casadi_hands.motion.pose import placed
+from casadi_hands.nlp import Kernel
+from casadi_hands.stages.object_motion.palm import Palm
+from casadi_hands.terms import clearance, contact, finger
+
+
+def given_morphology(kernel: Kernel, joints: int, place: int | None = None) -> FingerSymbols:
+    """A finger whose morphology is parameters: seed frames, base, lengths, axis coordinates."""
+    tag = "" if place is None else str(place)
+    frames = kernel.parameter(f"frames{tag}", 9 * joints, "frames", place)
+    return morphology(kernel.parameter, frames, joints, place)
+
+
+@cache
+def touch(joints: int, moves: bool) -> Kernel:
+    """One finger and its contact at one sample (Table 2.4): all that ties the contact to the finger."""
+    kernel = Kernel("touch")
+    pose, pose_before = kernel.variable("pose", 6, place=0), kernel.variable("pose_before", 6, "pose", -1)
+    point, force, activity = kernel.variable("point", 3), kernel.variable("force", 3), kernel.variable("activity", 1)
+    angles = kernel.variable("angles", joints, place=0)
+    angles_before = kernel.variable("angles_before", joints, "angles", -1)
+    palm, palm_before = Palm(kernel, moves), Palm(kernel, moves, before=True)
+    symbols = given_morphology(kernel, joints)
+    reference = kernel.parameter("reference", 4)
+    radius, friction, sharpness, step = (kernel.parameter(n) for n in ("link_radius", "friction", "sharpness", "step"))
+    position, quaternion = placed(pose, reference)
+    rotation = rotation_matrix(quaternion)
+    in_palm = palm.sees(position + ca.mtimes(rotation, point))
+    skeleton = symbols.placed(angles, radius)
+    last = skeleton.origins[:, -1]
+    on_link = ca.mtimes(skeleton.tip_rotation.T, in_palm - last)
+    here = symbols.placed(angles, radius, on_link)
+    projection, normal, _ = project_to_capsule(on_link, SX.zeros(3, 1), ca.vertcat(0, 0, symbols.lengths[-1]), radius)
+    force_in_palm = palm.turned(ca.mtimes(rotation, force))
+    kernel.cost("contact_on_finger", contact.off_surface(force, activity, on_link, projection), "sum")
+    position_before, quaternion_before = placed(pose_before, reference)
+    object_moved = in_palm - palm_before.sees(position_before + ca.mtimes(rotation_matrix(quaternion_before), point))
+    finger_moved = in_palm - symbols.placed(angles_before, radius, on_link).contact
+    kernel.cost("slip_on_finger", contact.slip(force, activity, object_moved, finger_moved, step))
+    cone = contact.friction_cone(force_in_palm, ca.mtimes(here.tip_rotation, normal), friction, sharpness)
+    kernel.cost("friction_cone_hand", activity * cone, "sum")
+    kernel.cost("null_space", activity * finger.null_space(here.jacobian, force_in_palm), "sum")
+    kernel.cost("torque", activity * finger.joint_torques(here.jacobian, force_in_palm))
+    return kernel
+
+
+@cache
+def move(joints: int) -> Kernel:
+    """One finger's joints at one sample: eq. 2.26 for all tips, and eq. 2.27 as a plain square outside the limits."""
+    kernel = Kernel("move")
+    angles = [kernel.variable(f"angles{i}", joints, "angles", i) for i in range(3)]
+    symbols = given_morphology(kernel, joints)
+    lowest, highest, step = kernel.parameter("lowest"), kernel.parameter("highest"), kernel.parameter("step")
+    before, now, after = (symbols.placed(a, SX(0)).tip for a in angles)  # wherever it stands
+    kernel.cost("finger_acceleration", finger.tip_acceleration(before, now, after, step))
+    kernel.cost("joint_limits", ca.vertcat(ca.fmax(angles[1] - highest, 0), ca.fmax(lowest - angles[1], 0)))
+    return kernel
+
+
+@cache
+def object_clearance(joints: int, primitives: int, moves: bool) -> Kernel:
+    """One finger against object, palm, ground and itself at one sample (eq. 2.20)."""
+    kernel = Kernel("object_clearance")
+    pose, angles = kernel.variable("pose", 6), kernel.variable("angles", joints)
+    palm = Palm(kernel, moves)
+    symbols = given_morphology(kernel, joints)
+    reference = kernel.parameter("reference", 4)
+    radius, palm_radius, ground, margin = (
+        kernel.parameter(name) for name in ("link_radius", "palm_radius", "ground_height", "margin")
+    )
+    shapes = ca.reshape(kernel.parameter("all_primitives", 7 * primitives), 7, primitives)
+    position, quaternion = placed(pose, reference)
+    rotation = rotation_matrix(quaternion)
+
+    def seen(end: SX) -> SX:
+        return palm.sees(position + ca.mtimes(rotation, end))
+
+    in_palm = ca.horzcat(
+        *[ca.vertcat(seen(shapes[:3, k]), seen(shapes[3:6, k]), shapes[6, k]) for k in range(primitives)]
+    )
+    here = symbols.placed(angles, radius)
+    up = palm.turned(SX([0, 0, 1]))
+    apart, touching = distances(here, radius, palm_radius, in_palm, up, ground - palm.position[2])
+    kernel.cost("collision", clearance.overlap(ca.vertcat(margin - apart, -touching)), "sum")
+    return kernel
+
+
+def distances(
+    here: PlacedFinger, radius: SX, palm_radius: SX, primitives: SX, up: SX | None, ground: SX
+) -> tuple[SX, SX]:
+    """Distances between one finger and all but other fingers: those to keep apart, and the touching link's (K,).
+
+    Without a ground ``up`` is None.
+    """
+    ends = here.ends
+    apart = [clearance.links_and_palm(ends, radius, palm_radius), clearance.links_of_one(ends, radius)]
+    if up is not None:
+        apart.append(clearance.links_and_ground(ends, radius, up, ground))
+    if len(ends) > 1:
+        apart.append(clearance.links_and_object(ends[:-1], radius, primitives))
+    return ca.vertcat(*apart), clearance.links_and_object(ends[-1:], radius, primitives)
+
+
+@cache
+def finger_clearance(joints: int, other_joints: int) -> Kernel:
+    """Two fingers against each other at one sample (eq. 2.20)."""
+    kernel = Kernel("finger_clearance")
+    angles = kernel.variable("angles0", joints, "angles", 0)
+    other_angles = kernel.variable("angles1", other_joints, "angles", 1)
+    first, second = given_morphology(kernel, joints, 0), given_morphology(kernel, other_joints, 1)
+    radius, margin = kernel.parameter("link_radius"), kernel.parameter("margin")
+    apart = clearance.links_and_links(
+        first.placed(angles, radius).ends, second.placed(other_angles, radius).ends, radius
+    )
+    kernel.cost("collision", clearance.overlap(margin - apart), "sum")
+    return kernel
+
+
+@cache
+def palm_motion() -> Kernel:
+    """A moving palm at one keyframe: acceleration of its offset, and a weak pull to the given motion."""
+    kernel = Kernel("palm_motion")
+    before, now, after = (kernel.variable(f"palm{i}", 6, "palm", i) for i in range(3))
+    step = kernel.parameter("keyframe_step")
+    kernel.cost("base_acceleration", ca.vertcat((after - 2 * now + before) / step**2, 0.1 * now))
+    return kernel

@@ -1,0 +1,1 @@
+"""Statics in numbers: grasp maps, friction cones, and programmes over forces in them."""

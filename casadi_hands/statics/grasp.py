@@ -1,0 +1,36 @@
+"""Grasp statics in numbers: the grasp map and linearised friction cones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from casadi_hands.geometry.contact_points import inward_normals
+
+Array = NDArray[np.float64]
+EDGES = 8  # of a linearised friction cone
+
+
+def grasp_map(points: Array) -> Array:
+    """(6, 3C) from contact forces to the wrench about the object's origin; points (C, 3), all in one frame."""
+    return np.vstack([np.tile(np.eye(3), len(points)), np.hstack([pin.skew(p) for p in points])])
+
+
+def friction_edges(normals: Array, friction: Array) -> Array:
+    """(3, C·edges) unit-normal-force edges of the linearised friction cones, inscribed."""
+    across = np.cross(normals, np.eye(3)[np.argmin(np.abs(normals), axis=1)])
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    other = np.cross(normals, across)
+    angles = np.linspace(0, 2 * np.pi, EDGES, endpoint=False)[:, None]
+    sideways = np.cos(angles) * across[:, None] + np.sin(angles) * other[:, None]
+    edges: Array = (normals[:, None] + friction[:, None, None] * sideways).reshape(-1, 3).T
+    return edges
+
+
+def spread_forces(points: Array, capsules: Array, friction: Array) -> Array:
+    """(3C, 8C): contact forces one above the other for each edge of the friction cones."""
+    edges = friction_edges(inward_normals(points, capsules), friction)
+    count = edges.shape[1] // len(points)
+    mask = np.kron(np.eye(len(points)), np.ones((3, count)))
+    return np.asarray(np.tile(edges, (len(points), 1)) * mask)

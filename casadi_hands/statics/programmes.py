@@ -1,0 +1,36 @@
+"""Linear programmes over forces in friction cones."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+
+Array = NDArray[np.float64]
+
+
+def least_largest(rows: Array, wrenches: Array, wrench: Array) -> float:
+    """The least over x >= 0 with ``wrenches @ x = wrench`` of the largest component of ``|rows @ x|``."""
+    edges = least_largest_solution(rows, wrenches, wrench)
+    return float(np.abs(rows @ edges).max()) if edges is not None else float("inf")
+
+
+def least_largest_solution(
+    rows: Array, wrenches: Array, wrench: Array, borne: Array | None = None, most: float = 0.0
+) -> Array | None:
+    """The x of ``least_largest``, where besides ``|borne @ x| <= most``; None if there is none."""
+    count = rows.shape[1]
+    below = [np.column_stack([sign * rows, -np.ones(len(rows))]) for sign in (1, -1)]
+    limit = [np.zeros(2 * len(rows))]
+    if borne is not None:
+        below += [np.column_stack([sign * borne, np.zeros(len(borne))]) for sign in (1, -1)]
+        limit.append(np.full(2 * len(borne), most))
+    found = linprog(
+        np.append(np.zeros(count), 1.0),
+        A_ub=np.vstack(below),
+        b_ub=np.concatenate(limit),
+        A_eq=np.column_stack([wrenches, np.zeros(len(wrench))]),
+        b_eq=wrench,
+        method="highs",
+    )
+    return np.asarray(found.x[:count]) if found.status == 0 else None

@@ -1,0 +1,126 @@
+"""What the stages constrain: each with its equation, its unit, and what to say where a solve violates it.
+
+Lengths are in units of the characteristic length, forces in m·g. ``explains`` names figures of the audit that follow.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from casadi_hands.nlp import Constraint
+
+_JOINTS = "more joints (search.max_joints)"
+_REACH = f"{_JOINTS} or a contact on the palm's side of the object"
+_ROOM = "thinner links (hand.link_radius), a palm farther away or contacts farther apart"
+_GRIP = "more friction or contacts that oppose each other better"
+_TORQUE = "stronger motors (actuator.torque), a lighter object or more friction"
+_SIDE = f"{_JOINTS} or a contact that is pressed from another side"
+_PACE = "slower goals, more friction or more fingers"
+_DISTURBED = "weaker perturbations, more friction or more fingers"
+_BALANCE, _GAP = ("residual", "residual_between"), ("gap", "gap_between")
+
+# The soft stages'.
+IN_CONE = Constraint("in_cone", "eq. 2.8 as a bound", "force")
+ENOUGH_CONTACTS = Constraint("sum", "section 2.2.1")
+
+# The object's motion.
+DEFECT = Constraint(
+    "defect", "Newton–Euler from knot to knot", "", "be moved as planned by the forces of its contacts", _PACE, _BALANCE
+)
+WRENCH_OF_CONTACTS = replace(DEFECT, name="sum", equation="eq. 2.5 and 2.6: the contacts' wrench")
+EQUILIBRIUM = Constraint("sum", "rest without a jolt", "", "be held still at the start and the end", _PACE, _BALANCE)
+DISTURBED_WRENCH = Constraint(
+    "sum",
+    "eq. 2.5 and 2.6 under a disturbance",
+    "",
+    "stay on its path under the perturbation",
+    _DISTURBED,
+    ("disturbance_radius",),
+)
+CLEAR_OF_PALM = Constraint(
+    "palm", "section 3.2.3", "length", "stay clear of the palm", "goals farther from the palm", ("penetration",)
+)
+ABOVE_GROUND = Constraint(
+    "ground", "section 3.1", "length", "stay above the ground", "goals above the ground", ("penetration",)
+)
+ON_PATH = Constraint("on_path", "fig. 3.4", "length", "draw its path", _PACE, ("goal_position",))
+
+# A finger's contact.
+ON_OBJECT = Constraint(
+    "on_object", "eq. 2.10 as an equation", "length", "stay on the object's surface", _REACH, (*_GAP, *_BALANCE, "slip")
+)
+ON_LINK = Constraint(
+    "on_link", "eq. 2.19 as an equation", "length", "reach its contact", _REACH, (*_GAP, *_BALANCE, "slip")
+)
+REGULAR = Constraint(
+    "regular", "singularity margin", "", "follow without being stretched out or folded", _REACH, (*_GAP, "slip")
+)
+PRESSING = Constraint("pressing", "lower bound on the normal force", "force", "press firmly enough", _GRIP, ("pull",))
+CONE = Constraint("cone", "eq. 2.8: (μ f_n)² - f_t²", "", "press without slipping", _GRIP, ("friction_excess", "slip"))
+ACTUATED = Constraint(
+    "passive",
+    "eq. 2.23: force borne by the structure",
+    "force",
+    "supply its force with its joints",
+    _SIDE,
+    ("unsupplied_force",),
+)
+WITHIN_TORQUE = Constraint(
+    "torque",
+    "eq. 2.24 as a bound",
+    "torque",
+    "supply its force within the torque limit",
+    _TORQUE,
+    ("torque", "unsupplied_force"),
+)
+NO_SLIP = Constraint(
+    "no_slip",
+    "eq. 2.12 as an equation: both paths agree",
+    "length",
+    "roll with the object",
+    f"{_JOINTS} or a smaller turn of the object",
+    ("slip", *_GAP, *_BALANCE),
+)
+
+# The same under a disturbance.
+DISTURBED_PRESSING = replace(PRESSING, cannot="keep pressing under the perturbation", advice=_DISTURBED, explains=())
+DISTURBED_CONE = replace(CONE, cannot="hold without slipping under the perturbation", advice=_DISTURBED, explains=())
+DISTURBED_ACTUATED = replace(ACTUATED, cannot="supply its force under the perturbation", explains=())
+DISTURBED_TORQUE = replace(WITHIN_TORQUE, cannot="supply its force under the perturbation", explains=())
+
+# The ground's contact.
+_GROUND = Constraint(
+    "",
+    "section 3.1",
+    "",
+    "rest on the ground as planned",
+    "goals at which it stands on the ground, or a rougher one",
+    (*_GAP, "slip"),
+)
+ON_SURFACES, OPPOSED, FACING = (replace(_GROUND, name=name) for name in ("on_surfaces", "opposed", "facing"))
+GROUND_PRESSING, GROUND_CONE = (replace(_GROUND, name=name) for name in ("pressing", "cone"))
+DISTURBED_GROUND_PRESSING = replace(
+    PRESSING, cannot="stay pressed on the ground under the perturbation", advice=_DISTURBED, explains=()
+)
+DISTURBED_GROUND_CONE = replace(
+    CONE, cannot="stand on the ground without slipping under the perturbation", advice=_DISTURBED, explains=()
+)
+GROUND_NO_SLIP = replace(
+    NO_SLIP,
+    cannot="stand on the ground without slipping",
+    advice="a rougher ground (ground.friction)",
+    explains=(*_GAP, "slip"),
+)
+
+# A finger.
+CLEAR = Constraint("clear", "eq. 2.20 as a bound", "length", "stay clear of the other bodies", _ROOM, ("penetration",))
+CLEAR_OF_EACH_OTHER = replace(CLEAR, cannot="stay clear of each other")
+WITHIN_SPEED = Constraint(
+    "speed",
+    "the actuator's limit",
+    "speed",
+    "keep within the joints' speed limit",
+    "faster motors (actuator.speed) or slower goals",
+    ("speed",),
+)
+ON_PALM = Constraint("on_palm", "eq. 2.25 as a bound", "", "start on the palm", "a larger palm (palm.radius)")

@@ -1,0 +1,86 @@
+"""Is the hand one that the task allows, and can it do what the motion asks of it?"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from casadi_hands.verify.figures.wrench import planned_torques
+from casadi_hands.verify.reading.folder import Folder
+from casadi_hands.verify.trajectory import Trajectory
+
+STAND = 1.05
+"""Link radii above the palm's face that a finger's first joint stands: its first link just clears the palm."""
+ROUNDED = 1e-6
+"""Share by which a size may be off."""
+
+
+def hand_task_problems(folder: Folder, path: Trajectory) -> list[str]:
+    """Return where the hand is not one that the task allows, or its joints cannot do the motion, a sentence each."""
+    return [*_joint_problems(folder), *_size_problems(folder), *_motor_problems(folder, path)]
+
+
+def _joint_problems(folder: Folder) -> list[str]:
+    lower, upper = np.deg2rad(folder.task.hand.joint_limits)
+    problems = []
+    for name, joint in folder.joints.items():
+        if abs(joint.lower - lower) > 1e-6 or abs(joint.upper - upper) > 1e-6:
+            problems.append(
+                f"joint {name}: its limits in hand.urdf are {joint.lower:.4g} and {joint.upper:.4g} rad,"
+                f" the task's {lower:.4g} and {upper:.4g} rad"
+            )
+        if abs(float(np.linalg.norm(joint.axis)) - 1.0) > 1e-6:
+            problems.append(f"joint {name}: its axis in hand.urdf is not a unit vector")
+    most, counts = folder.task.search.max_joints, dict.fromkeys(folder.fingers, 0)
+    for name in folder.joints:
+        finger = folder.call(name.replace("_joint", "_link")).partition("'")[2].partition("'")[0]
+        counts[finger] = counts.get(finger, 0) + 1
+    for finger, count in counts.items():
+        if count > most:
+            problems.append(f"finger '{finger}' has {count} joints; the task allows {most} (search.max_joints)")
+    return problems
+
+
+def _size_problems(folder: Folder) -> list[str]:
+    task, problems = folder.task, []
+    shortest, longest = task.hand.link_length
+    for name, body in folder.links.items():
+        who = folder.call(name)
+        if name == "palm":
+            continue
+        for capsule in body.capsules:
+            length = float(np.linalg.norm(capsule.end - capsule.start))
+            if not shortest * (1 - ROUNDED) <= length <= longest * (1 + ROUNDED):
+                allowed = f"{1e3 * shortest:.4g} to {1e3 * longest:.4g} mm"
+                problems.append(f"{who} is {1e3 * length:.4g} mm long; the task allows {allowed}")
+            due = task.hand.link_radius
+            if abs(capsule.radius - due) > ROUNDED * due:
+                problems.append(f"{who} has a radius of {1e3 * capsule.radius:.4g} mm, the task {1e3 * due:.4g} mm")
+    for name, joint in folder.joints.items():
+        if joint.parent != "palm":
+            continue
+        who, out = folder.call(name.replace("_joint", "_link")), float(np.linalg.norm(joint.position[:2]))
+        if out > task.palm.radius * (1 + ROUNDED):
+            problems.append(f"{who} stands {1e3 * out:.4g} mm out, off the palm of {1e3 * task.palm.radius:.4g} mm")
+        high = STAND * task.hand.link_radius
+        if not -ROUNDED * high <= joint.position[2] <= high * (1 + ROUNDED):
+            problems.append(f"{who} stands {1e3 * joint.position[2]:.4g} mm above the palm's face, not on it")
+    return problems
+
+
+def _motor_problems(folder: Folder, path: Trajectory) -> list[str]:
+    """Return which joints' effort or speed in ``hand.urdf`` is too small for the motion, or not the task's motor's."""
+    motion, motor, problems = folder.motion, folder.task.actuator, []
+    torques = np.max([np.abs(planned_torques(folder, force)).max(axis=0) for _, force, _ in folder.scenarios()], axis=0)
+    speeds = np.abs(path.speeds).max(axis=0)
+    for column, name in enumerate(motion.joint_names):
+        joint = folder.joints[name]
+        for word, has, needs, unit, of_motor in (
+            ("effort", joint.effort, torques[column], "N·m", motor.torque if motor else None),
+            ("velocity", joint.velocity, speeds[column], "rad/s", motor.speed if motor else None),
+        ):
+            if of_motor is not None and abs(has - of_motor) > ROUNDED * of_motor:
+                theirs = f"the task's motor's {of_motor:.4g}"
+                problems.append(f"joint {name}: its {word} limit in hand.urdf is {has:.4g} {unit}, {theirs}")
+            elif of_motor is None and needs > has * (1 + ROUNDED):
+                problems.append(f"joint {name}: its {word} limit of {has:.4g} {unit} is below the {needs:.4g} it needs")
+    return problems

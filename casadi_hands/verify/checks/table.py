@@ -1,0 +1,71 @@
+"""Is ``motion.csv`` the motion of ``motion.npz``, number by number?"""
+
+from __future__ import annotations
+
+import csv
+
+import numpy as np
+
+from casadi_hands.errors import DesignError
+from casadi_hands.verify.reading.folder import Folder
+
+_UNITS = {
+    **dict.fromkeys(("object_position", "base_position", "contact_point_object", "contact_point_link"), "m"),
+    **dict.fromkeys(("contact_force", "contact_force_disturbed", "external_force", "external_force_disturbed"), "N"),
+    **dict.fromkeys(("joint_torques", "external_torque", "external_torque_disturbed"), "N m"),
+    **dict.fromkeys(("joint_angles", "joint_commands"), "rad"),
+    **{"time": "s", "joint_velocities": "rad/s"},
+    **dict.fromkeys(("object_orientation", "base_orientation", "contact_active"), ""),
+}
+
+
+def table_problems(folder: Folder) -> list[str]:
+    """Return where the table, if there is one, is not the motion, a sentence each.
+
+    Raises:
+        DesignError: it is no table of numbers.
+    """
+    path = folder.path / "motion.csv"
+    if not path.is_file():
+        return []
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            names, *rows = csv.reader(file)
+        values = np.array([[float(word) for word in row] for row in rows])
+    except (OSError, ValueError, csv.Error) as error:
+        raise DesignError(f"{path}: not a table of numbers: {error}") from None
+    due = _columns(folder)
+    if values.shape != (len(folder.motion.time), len(names)) or not np.all(np.isfinite(values)):
+        return ["motion.csv: has not a row of finite numbers for each sample of motion.npz"]
+    problems = [f"motion.csv: column '{name}' is not of motion.npz" for name in names if name not in due]
+    problems += [f"motion.csv: has {names.count(name)} columns '{name}'" for name in due if names.count(name) != 1]
+    for name, column in zip(names, values.T, strict=True):
+        off = np.abs(column - due.get(name, column))
+        if off.max() > 1e-9 * max(1.0, float(np.abs(column).max())):
+            at = folder.motion.time[int(np.argmax(off))]
+            problems.append(f"motion.csv: '{name}' at {at:.3g} s is not that of motion.npz")
+    return problems
+
+
+def _columns(folder: Folder) -> dict[str, np.ndarray]:
+    """Return name -> values (S,) of every column that the motion gives."""
+    motion, columns = folder.motion, {}
+    for name, unit in _UNITS.items():
+        array = getattr(motion, name)
+        if array is None:
+            continue
+        if name.startswith("joint_"):
+            parts = list(zip(motion.joint_names, array.T, strict=True))
+        elif name.startswith("contact_"):
+            parts = list(zip(motion.contact_names, np.moveaxis(array, 1, 0), strict=True))
+        else:
+            parts = [("", array)]
+        suffix = f" [{unit}]" if unit else ""
+        for part, values in parts:
+            title = "/".join(filter(None, (name, part)))
+            if values.ndim == 1:
+                columns[title + suffix] = values.astype(float)
+                continue
+            for component, column in zip("wxyz" if values.shape[1] == 4 else "xyz", values.T, strict=True):
+                columns[f"{title}/{component}{suffix}"] = column
+    return columns

@@ -1,0 +1,1 @@
+"""The figures of the certificate, measured from the files."""

@@ -1,0 +1,75 @@
+"""Do bodies overlap, and do joints stay within what the hand can do?"""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+
+from casadi_hands.verify.reading.folder import Folder
+from casadi_hands.verify.report import Figure, worse
+from casadi_hands.verify.shapes import Body, body_distance
+from casadi_hands.verify.trajectory import DENSITY, Trajectory
+
+
+def body_pairs(folder: Folder) -> list[tuple[Body, Body]]:
+    """Return every pair of bodies that must not overlap.
+
+    Neighbours in a chain share a joint and so touch. The palm and a finger's first link share one, too, but that link
+    stands on the palm's face, clear of it. Palm and ground may not touch either.
+    """
+    bodies = [folder.object, *folder.links.values()]
+    pairs = [pair for pair in combinations(bodies, 2) if not _neighbours(pair[0].name, pair[1].name)]
+    if folder.ground is not None:
+        pairs += [(folder.ground, body) for body in bodies]
+    return pairs
+
+
+def _neighbours(first: str, second: str) -> bool:
+    if not {"object", "palm"}.isdisjoint((first, second)):
+        return False
+    (one, _, i), (other, _, j) = first.partition("_link"), second.partition("_link")
+    return one == other and abs(int(i) - int(j)) < 2
+
+
+def penetration_figure(folder: Folder, path: Trajectory) -> Figure:
+    """Return the deepest overlap of any two bodies at dense times, m; zero when none overlap."""
+    worst = (0.0, "no two bodies overlap")
+    depths = np.zeros(len(folder.motion.time) - 1)
+    for first, second in body_pairs(folder):
+        for i in range(0, len(path.time), DENSITY // 4):
+            depth = -body_distance(first, path.at(first.name, i), second, path.at(second.name, i))
+            k = path.interval[i]
+            depths[k] = np.fmax(depths[k], depth)
+            if not depth <= worst[0]:
+                names = f"{folder.call(first.name)} and {folder.call(second.name)}"
+                worst = worse(worst, (depth, f"{names} overlap by {{value}} at {path.time[i]:.3g} s"))
+    return Figure("penetration", worst[0], folder.task.limits.penetration, "m", worst[1], by_interval=depths)
+
+
+def joint_figures(folder: Folder, path: Trajectory) -> list[Figure]:
+    """Return the angle beyond a joint's limit, deg, and the largest joint speed."""
+    columns = folder.joint_columns()
+    low, high = folder.model.lowerPositionLimit[columns], folder.model.upperPositionLimit[columns]
+    over = np.rad2deg(np.maximum(path.joints - high, low - path.joints))
+    i, j = np.unravel_index(np.argmax(over), over.shape)
+    name, limits = folder.motion.joint_names[j], folder.task.limits
+    words = f"joint {name} of {_finger(folder, name)} is {{value}} beyond its limit at {path.time[i]:.3g} s"
+    if over[i, j] <= 0.0:
+        words = "no joint is beyond its limit"
+    by_interval = np.zeros(len(folder.motion.time) - 1)
+    np.maximum.at(by_interval, path.interval, over.max(axis=1))
+    value = max(float(over[i, j]), 0.0)
+    beyond = Figure("joint_limit", value, limits.joint_limit, "deg", words, by_interval=by_interval)
+    speed = np.abs(path.speeds)
+    i, j = np.unravel_index(np.argmax(speed), speed.shape)
+    name = folder.motion.joint_names[j]
+    where = f"joint {name} of {_finger(folder, name)} at {path.time[i]:.3g} s"
+    if folder.task.actuator is None:
+        return [beyond, Figure("speed", float(speed[i, j]), None, "rad/s", f"{{value}} in {where}")]
+    share = float(speed[i, j]) / folder.task.actuator.speed
+    return [beyond, Figure("speed", share, limits.speed, "share", f"{{value}} of the actuator's speed in {where}")]
+
+
+def _finger(folder: Folder, joint: str) -> str:
+    return folder.call(joint.replace("_joint", "_link")).partition(" (")[0]

@@ -1,0 +1,218 @@
+"""A URDF file: its links as bodies, its joints, and what it holds beside what the format says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from casadi_hands.errors import DesignError
+from casadi_hands.verify.reading.markup import called, name_of, number, numbers, only, positive, read_xml, strangers
+from casadi_hands.verify.shapes import Body, Capsule, Cylinder, merge, solids
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A revolute joint of a URDF.
+
+    Attributes:
+        name: as in the URDF.
+        parent, child: links.
+        position: (3,) m, of the child's frame in the parent's.
+        turn: (3,) roll, pitch and yaw of the child's frame in the parent's at zero angle, rad.
+        axis: (3,) in the child's frame.
+        lower, upper: rad.
+        effort: N·m.
+        velocity: rad/s.
+    """
+
+    name: str
+    parent: str
+    child: str
+    position: np.ndarray
+    turn: np.ndarray
+    axis: np.ndarray
+    lower: float
+    upper: float
+    effort: float
+    velocity: float
+
+
+@dataclass(frozen=True)
+class Robot:
+    """What a URDF says.
+
+    Attributes:
+        links: by name, in the file's order.
+        joints: likewise.
+        strange: what the format does not have, a sentence each.
+    """
+
+    links: dict[str, Body]
+    joints: dict[str, Joint]
+    strange: tuple[str, ...]
+
+
+def read_robot(path: Path) -> Robot:
+    """Read a URDF made of spheres, cylinders and revolute joints.
+
+    A cylinder with a sphere of its radius at either end is read as the capsule they form.
+
+    Raises:
+        DesignError: the file is missing or is not XML; a name or a property is given twice; a number is missing, is not
+            finite or cannot be; a shape is neither sphere nor cylinder; a joint does not turn.
+    """
+    root = read_xml(path, "robot")
+    links: dict[str, Body] = {}
+    joints: dict[str, Joint] = {}
+    strange = list(strangers(root, "link joint transmission material mujoco", "name version"))
+    for element in root:
+        if element.tag == "link":
+            name = name_of(path, element, links)
+            links[name], odd = _read_link(path, name, element)
+            strange += odd
+        elif element.tag == "joint":
+            name = name_of(path, element, joints)
+            joints[name] = _read_joint(path, name, element)
+            strange += strangers(element, "parent child origin axis limit", "name type")
+        elif element.tag == "mujoco":
+            strange += _compiler(element)
+        elif element.tag == "transmission":
+            strange += _transmission(element, {joint.get("name") for joint in root.findall("joint")})
+    return Robot(links, joints, tuple(f"{path.name}: {what}" for what in strange))
+
+
+def _compiler(element: Element) -> list[str]:
+    found = list(strangers(element, "compiler", ""))
+    for compiler in element.findall("compiler"):
+        found += strangers(compiler, "", "fusestatic discardvisual")
+    return found
+
+
+def _transmission(element: Element, joints: set[str | None]) -> list[str]:
+    """Return what is wrong with a motor that does not turn one of the joints one to one."""
+    found = list(strangers(element, "type joint actuator", "name"))
+    turned = [joint.get("name") for joint in element.findall("joint")]
+    found += [f"{called(element)} turns joint '{name}', which there is not" for name in turned if name not in joints]
+    for ratio in element.iter("mechanicalReduction"):
+        if (ratio.text or "").strip() not in ("1", "1.0"):
+            found.append(f"{called(element)} reduces by {(ratio.text or 'nothing').strip()[:20]}, not by 1")
+    return found
+
+
+def _read_joint(path: Path, name: str, element: Element) -> Joint:
+    kind = element.get("type")
+    if kind != "revolute":
+        raise DesignError(f"{path}: joint {name} is of type '{kind}', not revolute")
+    parts = {tag: only(path, element, tag) for tag in ("parent", "child", "origin", "axis", "limit")}
+    missing = [tag for tag in ("parent", "child", "axis", "limit") if parts[tag] is None]
+    if missing:
+        raise DesignError(f"{path}: joint {name} has no <{missing[0]}>")
+    parent, child, origin, axis, limit = (parts[tag] for tag in ("parent", "child", "origin", "axis", "limit"))
+    assert parent is not None
+    assert child is not None
+    assert axis is not None
+    assert limit is not None
+    able = {word: number(path, limit, word) for word in ("effort", "velocity")}
+    for word, value in able.items():
+        if value <= 0.0:
+            raise DesignError(f"{path}: joint {name}: its {word} limit is {value:g}, not above zero")
+    lower, upper = number(path, limit, "lower"), number(path, limit, "upper")
+    if lower > upper:
+        raise DesignError(f"{path}: joint {name}: its lower limit, {lower:g}, is above its upper, {upper:g}")
+    zero = Element("origin")
+    return Joint(
+        name,
+        parent.get("link", ""),
+        child.get("link", ""),
+        numbers(path, zero if origin is None else origin, "xyz", 3, "0 0 0"),
+        numbers(path, zero if origin is None else origin, "rpy", 3, "0 0 0"),
+        numbers(path, axis, "xyz", 3, "1 0 0"),
+        lower,
+        upper,
+        able["effort"],
+        able["velocity"],
+    )
+
+
+def _placement(path: Path, element: Element) -> np.ndarray:
+    placement = np.eye(4)
+    origin = only(path, element, "origin")
+    if origin is not None:
+        turn = numbers(path, origin, "rpy", 3, "0 0 0")
+        placement[:3, :3] = Rotation.from_euler("xyz", turn).as_matrix()
+        placement[:3, 3] = numbers(path, origin, "xyz", 3, "0 0 0")
+    return placement
+
+
+def _read_link(path: Path, name: str, link: Element) -> tuple[Body, list[str]]:
+    strange = list(strangers(link, "inertial visual collision", "name"))
+    shapes = {}
+    for role in ("collision", "visual"):
+        spheres: list[Capsule] = []
+        cylinders: list[Cylinder] = []
+        for element in link.findall(role):
+            strange += strangers(element, "origin geometry material")
+            for color in element.iter("color"):
+                numbers(path, color, "rgba", 4)
+            _read_shape(path, name, element, spheres, cylinders)
+        shapes[role] = spheres, cylinders
+    if not _alike(*shapes["collision"], *shapes["visual"]):
+        strange.append(f"link {name} looks other than it collides: its visual geometry is not its collision geometry")
+    capsules, bare = merge(*shapes["collision"])
+    mass, center, inertia = _inertial(path, name, link)
+    return Body(name, mass, center, inertia, tuple(capsules), tuple(bare), solids(capsules, bare)), strange
+
+
+def _read_shape(path: Path, name: str, element: Element, spheres: list[Capsule], cylinders: list[Cylinder]) -> None:
+    placement, geometry = _placement(path, element), only(path, element, "geometry")
+    shape = geometry[0] if geometry is not None and len(geometry) == 1 else None
+    if shape is None:
+        raise DesignError(f"{path}: link {name}: its {element.tag} geometry is not one shape")
+    if shape.tag == "sphere":
+        spheres.append(Capsule(placement[:3, 3], placement[:3, 3], positive(path, shape, "radius")))
+    elif shape.tag == "cylinder":
+        cylinders.append(Cylinder(placement, positive(path, shape, "radius"), positive(path, shape, "length")))
+    else:
+        raise DesignError(f"{path}: link {name}: its {element.tag} geometry is neither sphere nor cylinder")
+
+
+def _alike(
+    spheres: list[Capsule], cylinders: list[Cylinder], other_spheres: list[Capsule], other_cylinders: list[Cylinder]
+) -> bool:
+    """Whether two lists of shapes are the same, in any order."""
+
+    def rows(spheres: list[Capsule], cylinders: list[Cylinder]) -> list[tuple[float, ...]]:
+        found = [np.array([s.radius, 0.0, *s.start, 0.0, 0.0, 0.0]) for s in spheres]
+        found += [np.array([c.radius, c.length, *c.placement[:3, 3], *c.placement[:3, 2]]) for c in cylinders]
+        return sorted(tuple(np.round(row, 9).tolist()) for row in found)
+
+    return rows(spheres, cylinders) == rows(other_spheres, other_cylinders)
+
+
+def _inertial(path: Path, name: str, link: Element) -> tuple[float, np.ndarray, np.ndarray]:
+    inertial = only(path, link, "inertial")
+    if inertial is None:
+        raise DesignError(f"{path}: link {name} has no mass: no <inertial>")
+    placement, mass, tensor = _placement(path, inertial), only(path, inertial, "mass"), only(path, inertial, "inertia")
+    if mass is None or tensor is None:
+        raise DesignError(f"{path}: link {name}: its <inertial> has no <{'mass' if mass is None else 'inertia'}>")
+    local = np.zeros((3, 3))
+    for i, one in enumerate("xyz"):
+        for j, other in enumerate("xyz"[i:], start=i):
+            local[i, j] = local[j, i] = number(path, tensor, f"i{one}{other}", None if i == j else "0")
+    principal = np.linalg.eigvalsh(local)
+    if principal[0] <= 0.0 or principal[2] > (principal[0] + principal[1]) * (1 + 1e-9):
+        raise DesignError(f"{path}: link {name}: its inertia is that of no solid body")
+    rotation = placement[:3, :3]
+    return _mass(path, name, mass), placement[:3, 3], rotation @ local @ rotation.T
+
+
+def _mass(path: Path, name: str, element: Element) -> float:
+    value = number(path, element, "value")
+    if value <= 0.0:
+        raise DesignError(f"{path}: link {name}: its mass is {value:g} kg, not above zero")
+    return value

@@ -1,0 +1,248 @@
+"""``scene.xml``: what MuJoCo would be told, by a parser of its own that passes over nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from casadi_hands.errors import DesignError
+from casadi_hands.verify.reading.markup import called, name_of, number, numbers, only, positive, read_xml, strangers
+
+_SECTIONS = "compiler option statistic default worldbody contact equality actuator keyframe visual asset"
+_OPTIONS = "timestep gravity integrator cone impratio noslip_iterations iterations tolerance solver"
+_GEOM = "name type pos fromto size friction condim priority solref solimp rgba"
+_KEY = ("time", "qpos", "ctrl", "mpos", "mquat")
+_FRICTION = "1 0.005 0.0001"
+
+
+@dataclass(frozen=True)
+class Geom:
+    """A solid of a body.
+
+    Attributes:
+        kind: ``sphere``, ``capsule``, ``cylinder`` or ``plane``.
+        start, end: (3,) ends of its axis, m, body frame; of a plane, a point of it, twice.
+        radius: m.
+        friction: (3,) sliding, torsional (m) and rolling (m).
+        priority: whose friction holds where two touch.
+    """
+
+    kind: str
+    start: np.ndarray
+    end: np.ndarray
+    radius: float
+    friction: np.ndarray
+    priority: float
+
+
+@dataclass(frozen=True)
+class Hinge:
+    """A joint that turns: axis (3,), reference angle and limits (2,), rad."""
+
+    name: str
+    axis: np.ndarray
+    reference: float
+    limits: np.ndarray
+
+
+@dataclass(frozen=True)
+class SceneBody:
+    """A body of the scene.
+
+    Attributes:
+        parent: its parent's name; ``world`` at the top.
+        position: (3,) m, in the parent's frame.
+        orientation: (4,) [w, x, y, z], likewise.
+        free, mocap: whether it floats freely, or is moved from outside.
+        borne: the share of its weight that is taken off it.
+        mass: kg; 0 where none is stated.
+        center: (3,) m.
+        inertia: (3, 3) kg·m².
+    """
+
+    parent: str
+    position: np.ndarray
+    orientation: np.ndarray
+    free: bool
+    mocap: bool
+    borne: float
+    mass: float
+    center: np.ndarray
+    inertia: np.ndarray
+    hinges: tuple[Hinge, ...]
+    geoms: tuple[Geom, ...]
+
+
+@dataclass(frozen=True)
+class Servo:
+    """A position actuator: its name, the joint it turns, gains, and (2,) limits of its torque, N·m."""
+
+    name: str
+    joint: str
+    stiffness: float
+    damping: float
+    limits: np.ndarray
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What ``scene.xml`` says.
+
+    Attributes:
+        step: of the simulation, s.
+        gravity: (3,) m/s².
+        bodies: by name, in the file's order, which is that of MuJoCo's coordinates.
+        planes: of the world.
+        excluded: pairs of bodies that do not collide.
+        welds: pairs of bodies that are held together.
+        servos: in the file's order, which is that of MuJoCo's controls.
+        keys: name -> attribute -> its numbers.
+        strange: what the format does not have, a sentence each.
+    """
+
+    step: float
+    gravity: np.ndarray
+    bodies: dict[str, SceneBody] = field(default_factory=dict)
+    planes: list[Geom] = field(default_factory=list)
+    excluded: list[frozenset[str]] = field(default_factory=list)
+    welds: list[tuple[str, str]] = field(default_factory=list)
+    servos: list[Servo] = field(default_factory=list)
+    keys: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)
+    strange: list[str] = field(default_factory=list)
+
+
+def read_scene(path: Path) -> Scene:
+    """Read a scene.
+
+    Raises:
+        DesignError: the file is missing or is not XML; a name or a section is given twice; a number is missing or is
+            not finite; angles are not in radians.
+    """
+    root = read_xml(path, "mujoco")
+    section = {tag: only(path, root, tag) for tag in _SECTIONS.split()}
+    option, world = section["option"], section["worldbody"]
+    option = Element("option") if option is None else option
+    for name in ("impratio", "noslip_iterations", "iterations", "tolerance"):
+        number(path, option, name, "0")
+    if world is None:
+        raise DesignError(f"{path}: no <worldbody>, so nothing is in the scene")
+    if section["compiler"] is None or section["compiler"].get("angle") != "radian":
+        raise DesignError(f"{path}: angles are not in radians")
+    scene = Scene(number(path, option, "timestep", "0.002"), numbers(path, option, "gravity", 3, "0 0 -9.81"))
+    scene.strange.extend(strangers(root, _SECTIONS, "model"))
+    allowed = {"compiler": ("", "angle"), "option": ("", _OPTIONS), "default": ("geom", ""), "contact": ("exclude", "")}
+    allowed |= {"equality": ("weld", ""), "actuator": ("position", ""), "keyframe": ("key", "")}
+    for tag, (tags, attributes) in allowed.items():
+        if (element := section[tag]) is not None:
+            scene.strange.extend(strangers(element, tags, attributes))
+            for child in element:
+                _read_entry(path, scene, child)
+    _read_body(path, scene, world, "world")
+    return scene
+
+
+def _read_entry(path: Path, scene: Scene, element: Element) -> None:
+    """Read what stands in a section beside the bodies."""
+    odd = scene.strange
+    if element.tag == "geom":
+        odd += strangers(element, "", "condim solref solimp")
+        _read_looks(path, element)
+    elif element.tag == "exclude":
+        scene.excluded.append(frozenset((element.get("body1", ""), element.get("body2", ""))))
+        odd += strangers(element, "", "name body1 body2")
+    elif element.tag == "weld":
+        scene.welds.append((element.get("body1", ""), element.get("body2", "")))
+        odd += strangers(element, "", "body1 body2 solref")
+    elif element.tag == "position":
+        joint = element.get("joint", "")
+        kp, kv = positive(path, element, "kp"), number(path, element, "kv", "0")
+        scene.servos.append(Servo(element.get("name", ""), joint, kp, kv, numbers(path, element, "forcerange", 2)))
+        odd += strangers(element, "", "name joint kp kv forcelimited forcerange")
+        if element.get("forcelimited") != "true":
+            odd.append(f"{called(element)} limits no torque: forcelimited is not true")
+    elif element.tag == "key":
+        name = name_of(path, element, scene.keys)
+        odd += strangers(element, "", " ".join(("name", *_KEY)))
+        lengths = {key: len(text.split()) for key, text in element.items() if key in _KEY}
+        scene.keys[name] = {key: numbers(path, element, key, length) for key, length in lengths.items()}
+
+
+def _read_body(path: Path, scene: Scene, element: Element, name: str) -> None:
+    """Read what is on a body, and the bodies on it, in MuJoCo's order."""
+    geoms = tuple(_read_geom(path, scene, geom) for geom in element.findall("geom"))
+    if name == "world":
+        scene.strange.extend(strangers(element, "body geom light camera"))
+        scene.planes.extend(geoms)
+    else:
+        scene.strange.extend(strangers(element, "body geom inertial joint freejoint", "name pos quat gravcomp mocap"))
+        inertial, free = only(path, element, "inertial"), only(path, element, "freejoint")
+        scene.strange.extend(strangers(free, "", "name") if free is not None else ())
+        mass, center, inertia = 0.0, np.zeros(3), np.zeros((3, 3))
+        if inertial is not None:
+            mass, center = positive(path, inertial, "mass"), numbers(path, inertial, "pos", 3)
+            xx, yy, zz, xy, xz, yz = numbers(path, inertial, "fullinertia", 6)
+            inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+            scene.strange.extend(strangers(inertial, "", "pos mass fullinertia"))
+        scene.bodies[name] = SceneBody(
+            parent="",
+            position=numbers(path, element, "pos", 3, "0 0 0"),
+            orientation=numbers(path, element, "quat", 4, "1 0 0 0"),
+            free=free is not None,
+            mocap=element.get("mocap") == "true",
+            borne=number(path, element, "gravcomp", "0"),
+            mass=mass,
+            center=center,
+            inertia=inertia,
+            hinges=tuple(_read_hinge(path, scene, joint) for joint in element.findall("joint")),
+            geoms=geoms,
+        )
+    for child in element.findall("body"):
+        own = name_of(path, child, {**scene.bodies, "world": None})
+        _read_body(path, scene, child, own)
+        scene.bodies[own] = _on(scene.bodies[own], name)
+
+
+def _on(body: SceneBody, parent: str) -> SceneBody:
+    return SceneBody(**{**vars(body), "parent": parent})
+
+
+def _read_looks(path: Path, element: Element) -> None:
+    """Read what of a solid is compared with nothing, so that it is numbers."""
+    for name, count in (("rgba", 4), ("solref", 2), ("solimp", 3), ("condim", 1)):
+        if element.get(name) is not None:
+            numbers(path, element, name, count)
+
+
+def _read_hinge(path: Path, scene: Scene, element: Element) -> Hinge:
+    scene.strange.extend(strangers(element, "", "name axis ref limited range armature"))
+    if element.get("limited") != "true":
+        scene.strange.append(f"{called(element)} has no limits: limited is not true")
+    number(path, element, "armature", "0")
+    axis, limits = numbers(path, element, "axis", 3), numbers(path, element, "range", 2)
+    return Hinge(element.get("name", ""), axis, number(path, element, "ref", "0"), limits)
+
+
+def _read_geom(path: Path, scene: Scene, element: Element) -> Geom:
+    scene.strange.extend(strangers(element, "", _GEOM))
+    kind = element.get("type", "sphere")
+    place = numbers(path, element, "pos", 3, "0 0 0")
+    start = end = place
+    radius = 0.0
+    if kind == "capsule":
+        ends = numbers(path, element, "fromto", 6)
+        start, end = ends[:3], ends[3:]
+        radius = positive(path, element, "size")
+    elif kind == "sphere":
+        radius = positive(path, element, "size")
+    elif kind == "cylinder":
+        radius, half = numbers(path, element, "size", 2)
+        reach = np.array([0.0, 0.0, half])
+        start, end = place - reach, place + reach
+    elif kind != "plane":
+        scene.strange.append(f"{called(element)} is a {kind}, which the format does not have")
+    _read_looks(path, element)
+    friction = numbers(path, element, "friction", 3, _FRICTION)
+    return Geom(kind, start, end, radius, friction, number(path, element, "priority", "0"))

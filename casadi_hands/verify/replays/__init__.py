@@ -1,0 +1,1 @@
+"""The design played by physics engines, as planned and perturbed."""

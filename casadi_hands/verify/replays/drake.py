@@ -1,0 +1,265 @@
+"""Drake as the replay's second engine: the same hand, commands and object, in physics written by others.
+
+Masses, inertias, joints and their limits come from ``hand.urdf`` and ``object.urdf`` through Drake's own parser; gains,
+rotor inertia and torque limits of the motors from ``scene.xml``; shapes are the URDF's with each cylinder and its two
+end spheres joined to a capsule, since overlapping shapes would press twice. Gravity, friction and ground are the
+task's.
+
+What means the same as in ``scene.xml``:
+
+- *Motors*: position and damping gains, implicit in the step; torque limits; rotor inertia; a hand that carries its own
+  weight.
+- *Friction*: Coulomb's, with the task's coefficient where the object touches the hand, and the ground's where it
+  touches the ground.
+- *Palm*: goes where the plan says with the plan's velocity, whatever pushes it.
+- *Collisions*: all, but of neighbours in a chain and of the palm with first links.
+
+What does not:
+
+- *Contacts* are patches of pressure that grow with depth (Drake's hydroelastic contact), not points: Drake's points
+  have no torsional friction, and what two fingertips hold would spin freely. MuJoCo's contacts stiffen within 2 % of
+  the object's half extent and are as stiff as the masses behind them are heavy; these know neither depth nor mass. The
+  pressure's gradient is such that six times the object's weight makes a patch of 0.375 of the fingertip's radius.
+  Fingertips then give as in MuJoCo: by 0.2 to 1 mm in the designs measured, the two within a factor of 1.6 or so.
+- *Torsional friction* is what such a patch has by itself, (8/15)·μ·radius of the patch: as much as MuJoCo's at the
+  force just named, and with the fourth root of the force less below it, usually 0.6 to 1 of MuJoCo's.
+- *Damping* in contacts is Hunt and Crossley's, with MuJoCo's relaxation time, 0.02 s, at that patch's depth. It never
+  pulls.
+- *The ground* is rigid, and a patch on it resists twisting; in ``scene.xml`` nothing does there.
+- *Stiction* creeps by some 0.01 mm/s; in ``scene.xml`` a pass of MuJoCo's own takes that back.
+- *Surfaces* are triangles, which leave the true shape by up to 0.3 of that patch's depth.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from casadi_hands.errors import DesignError, HandsError
+from casadi_hands.verify.figures.dynamics import object_rotation
+from casadi_hands.verify.reading.folder import Folder
+from casadi_hands.verify.replays.drake_scene import Motor, Shapes, load_drake, read_mechanics, read_motors, transform
+from casadi_hands.verify.replays.perturb import Perturbation
+from casadi_hands.verify.replays.simulation import RELEASE, SQUEEZE, SUPPORT, Observer, Plan, one_line
+
+STEP = 2e-3
+"""s; half of it changes the object's path by about 0.1 mm at most."""
+
+STICTION = 1e-5
+"""m/s at which stiction creeps under half of the force that it holds, about."""
+
+HEAVY = 1e6
+"""Of the object's mass: the palm's, where it moves. Only the force on it has to know."""
+
+
+class DrakeSimulation:
+    """Drake's model and state of a result folder, perturbed.
+
+    Attributes:
+        step: s.
+    """
+
+    step = STEP
+
+    def __init__(self, folder: Folder, perturbation: Perturbation) -> None:
+        """Build the scene and put everything at its start.
+
+        Raises:
+            DesignError: a file is missing, unreadable, or not of this hand.
+            HandsError: Drake is not installed or cannot be loaded.
+        """
+        self._drake = drake = load_drake()
+        self._names = folder.motion.joint_names
+        motors, self._moves = read_motors(folder, perturbation)
+        self._stiffer = perturbation.stiffness
+        self._bias = np.asarray(perturbation.joint_bias or np.zeros(len(self._names)))
+        builder = drake.systems.framework.DiagramBuilder()
+        config = drake.multibody.plant.MultibodyPlantConfig(
+            time_step=STEP,
+            stiction_tolerance=STICTION,
+            contact_model="hydroelastic_with_fallback",
+            discrete_contact_approximation="lagged",
+            use_sampled_output_ports=False,
+        )
+        self._plant, self._graph = drake.multibody.plant.AddMultibodyPlant(config, builder)
+        # The warning is about deformable bodies touching the ground, of which there are none.
+        with _quiet():
+            self._add_bodies(folder)
+            self._add_motors(motors)
+            Shapes(drake, self._plant, folder, perturbation.friction).add(self._hand, self._item)
+            self._plant.Finalize()
+            diagram = builder.Build()
+            self._simulator = drake.systems.analysis.Simulator(diagram)
+        actuators = (self._plant.get_joint_actuator(k) for k in self._plant.GetJointActuatorIndices(self._hand))
+        self._order = [self._names.index(actuator.joint().name()) for actuator in actuators]
+        self._context = self._plant.GetMyMutableContextFromRoot(self._simulator.get_mutable_context())
+        self._place(folder, perturbation)
+        self._simulator.Initialize()
+        self._steps = 0
+
+    def _add_bodies(self, folder: Folder) -> None:
+        """Parse the two URDF files, and weld a palm that stands still to the world."""
+        parser = self._drake.multibody.parsing.Parser(self._plant)
+        try:
+            (self._hand,) = parser.AddModelsFromString(read_mechanics(folder, "hand.urdf"), "urdf")
+            (self._item,) = parser.AddModelsFromString(read_mechanics(folder, "object.urdf"), "urdf")
+        except (RuntimeError, ValueError) as error:
+            raise DesignError(f"{folder.path}: Drake cannot read its URDF files: {one_line(error)}") from None
+        self._palm = self._plant.GetBodyByName("palm", self._hand)
+        self._object = self._plant.GetBodyByName("object", self._item)
+        self._plant.mutable_gravity_field().set_gravity_vector(folder.gravity)
+        self._plant.set_gravity_enabled(self._hand, False)
+        turn = Rotation.from_quat(folder.motion.base_orientation[0], scalar_first=True)
+        self._base = transform(self._drake, turn, folder.motion.base_position[0])
+        if not self._moves:
+            self._plant.WeldFrames(self._plant.world_frame(), self._palm.body_frame(), self._base)
+
+    def _add_motors(self, motors: dict[str, Motor]) -> None:
+        """Give every joint its motor, by way of the URDF's transmission where there is one."""
+        plant = self._plant
+        # Of the hand alone, the indices are known only once the plant is finalized.
+        made = [plant.get_joint_actuator(k) for k in plant.GetJointActuatorIndices()]
+        driven = {actuator.joint().name(): actuator for actuator in made}
+        for name in self._names:
+            motor, joint = motors[name], plant.GetJointByName(name, self._hand)
+            actuator = driven.get(name) or plant.AddJointActuator(name, joint, motor.effort)
+            actuator.set_effort_limit(motor.effort)
+            actuator.set_default_gear_ratio(1.0)
+            actuator.set_default_rotor_inertia(motor.armature)
+            gains = self._drake.multibody.tree.PdControllerGains(p=motor.stiffness, d=motor.damping)
+            actuator.set_controller_gains(gains)
+
+    def _place(self, folder: Folder, perturbation: Perturbation) -> None:
+        """Put everything at the motion's first sample, the object off it and heavier as the perturbation says."""
+        plant, context, make = self._plant, self._context, self._drake.multibody.tree.SpatialInertia
+        for name, angle in zip(self._names, folder.motion.joint_angles[0] + self._bias, strict=True):
+            plant.GetJointByName(name, self._hand).set_angle(context, angle)
+        turn = Rotation.from_rotvec(perturbation.start_turn) * object_rotation(folder)[0]
+        self._home = turn, folder.motion.object_position[0] + np.asarray(perturbation.start_shift)
+        self._displaced = perturbation.displaced
+        plant.SetFreeBodyPose(context, self._object, transform(self._drake, *self._home))
+        body = self._object.CalcSpatialInertiaInBodyFrame(context)
+        self._mass = perturbation.mass * body.get_mass()
+        scaled = make(self._mass, body.get_com(), body.get_unit_inertia())
+        self._object.SetSpatialInertiaInBodyFrame(context, scaled)
+        self._center = np.asarray(body.get_com())
+        about_center = scaled.Shift(self._center).CalcRotationalInertia()
+        self._inertia = np.asarray(about_center.CopyToFullMatrix3())
+        if self._moves:
+            palm = make.SolidSphereWithMass(HEAVY * self._mass, folder.length)
+            self._palm.SetSpatialInertiaInBodyFrame(context, palm)
+            self._palm_inertia = float(palm.CalcRotationalInertia().get_moments()[0])
+            plant.SetFreeBodyPose(context, self._palm, self._base)
+
+    def object_pose(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the object's position (3,) and quaternion (4,) [w, x, y, z], world."""
+        pose = self._plant.GetFreeBodyPose(self._context, self._object)
+        return np.asarray(pose.translation()), np.asarray(pose.rotation().ToQuaternion().wxyz())
+
+    def touches(self, link: str) -> bool:
+        """Whether the object touches any link of the contact's finger (or the ground)."""
+        finger, own = link.partition("_link")[0], self._object.index()
+        query = self._plant.get_geometry_query_input_port().Eval(self._context)
+        kind = self._drake.geometry.HydroelasticContactRepresentation.kPolygon
+        surfaces, points = query.ComputeContactSurfacesWithFallback(kind)
+        pairs = [(each.id_M(), each.id_N()) for each in surfaces] + [(each.id_A, each.id_B) for each in points]
+        for pair in pairs:
+            bodies = [self._plant.GetBodyFromFrameId(self._graph.model_inspector().GetFrameId(each)) for each in pair]
+            names = {
+                "ground" if body.index() == self._plant.world_body().index() else body.name().partition("_link")[0]
+                for body in bodies
+                if body.index() != own
+            }
+            if len(names) == 1 and finger in names and any(body.index() == own for body in bodies):
+                return True
+        return False
+
+    def settle(self, plan: Plan, observer: Observer | None) -> None:
+        """Squeeze at the start pose; an object off its place is held there by a soft support, which then lets go."""
+        for i in range(round((SQUEEZE + RELEASE) / self.step)):
+            force, torque, squeeze = np.zeros(3), np.zeros(3), 1.0
+            if self._displaced:
+                time = i * self.step
+                squeeze = min(time / SQUEEZE, 1.0)
+                force, torque = self._support(1.0 - max(0.0, time - SQUEEZE) / RELEASE)
+                # What the fingers do not bear yet: on its springs alone the object would sag and be gripped there.
+                force = force - (1.0 - squeeze) * self._mass * self._plant.gravity_field().gravity_vector()
+            ahead = squeeze * (plan.commands[0] - plan.angles[0])
+            self._follow(plan, 0, 0, ahead, plan.external_force[0] + force, plan.external_torque[0] + torque)
+            self._advance(observer)
+
+    def _support(self, share: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return a share of the spring force and torque that hold the object at its start."""
+        pose = self._plant.GetFreeBodyPose(self._context, self._object)
+        turn, (home_turn, home) = Rotation.from_matrix(pose.rotation().matrix()), self._home
+        velocity = self._plant.EvalBodySpatialVelocityInWorld(self._context, self._object)
+        # About every axis by its own inertia: a thin object would be shaken by what serves its length.
+        inertia = turn.as_matrix() @ self._inertia @ turn.as_matrix().T
+        off, turned = pose.translation() - home, (turn * home_turn.inv()).as_rotvec()
+        force = self._mass * (-(SUPPORT**2) * off - 2 * SUPPORT * velocity.translational())
+        torque = inertia @ (-(SUPPORT**2) * turned - 2 * SUPPORT * velocity.rotational())
+        return share * force, share * torque
+
+    def play(self, plan: Plan, i: int, push: np.ndarray, observer: Observer | None) -> None:
+        """Drive the hand as planned for a step, and make it; ``push`` (3,) is a force on the object, N, world."""
+        ahead = plan.commands[i] - plan.angles[i]
+        self._follow(plan, i, min(i + 1, len(plan) - 1), ahead, plan.external_force[i] + push, plan.external_torque[i])
+        self._advance(observer)
+
+    def _follow(
+        self, plan: Plan, i: int, following: int, ahead: np.ndarray, force: np.ndarray, torque: np.ndarray
+    ) -> None:
+        """Set the motors' set points, ``ahead`` (J,) rad of the planned angles, and the wrenches for a step."""
+        targets = plan.angles[i] + self._bias + ahead / self._stiffer
+        desired = np.concatenate([targets[self._order], np.zeros(len(targets))])
+        self._plant.get_desired_state_input_port(self._hand).FixValue(self._context, desired)
+        wrenches = [self._wrench(self._object, self._center, force, torque)]
+        if self._moves:
+            turn = Rotation.from_quat(plan.palm_quaternion[following], scalar_first=True)
+            wrenches.append(self._carry(turn, plan.palm_position[following]))
+        self._plant.get_applied_spatial_force_input_port().FixValue(self._context, wrenches)
+
+    def _carry(self, turn: Rotation, position: np.ndarray) -> Any:
+        """Return the wrench that brings the palm to a pose within a step: fingers feel how it accelerates."""
+        pose = self._plant.GetFreeBodyPose(self._context, self._palm)
+        velocity = self._plant.EvalBodySpatialVelocityInWorld(self._context, self._palm)
+        turned = (turn * Rotation.from_matrix(pose.rotation().matrix()).inv()).as_rotvec()
+        gain = (position - pose.translation()) / self.step - velocity.translational()
+        spin_up = turned / self.step - velocity.rotational()
+        force, torque = HEAVY * self._mass * gain / self.step, self._palm_inertia * spin_up / self.step
+        return self._wrench(self._palm, np.zeros(3), force, torque)
+
+    def _wrench(self, body: Any, at: np.ndarray, force: np.ndarray, torque: np.ndarray) -> Any:
+        """Return a force and torque, world, at a point of a body, body frame."""
+        wrench = self._drake.multibody.plant.ExternallyAppliedSpatialForce()
+        wrench.body_index, wrench.p_BoBq_B = body.index(), at
+        wrench.F_Bq_W = self._drake.multibody.math.SpatialForce(tau=torque, f=force)
+        return wrench
+
+    def _advance(self, observer: Observer | None) -> None:
+        self._steps += 1
+        try:
+            self._simulator.AdvanceTo(self._steps * self.step)
+        except RuntimeError as error:
+            raise HandsError(
+                f"Drake gave up {self._steps * self.step:.3f} s into the replay: {one_line(error)}"
+            ) from None
+        if observer is not None:
+            observer(self._plant, self._context)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep Drake's warnings off the terminal."""
+    logger = logging.getLogger("drake")
+    level = logger.level
+    logger.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)

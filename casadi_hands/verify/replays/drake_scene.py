@@ -1,0 +1,196 @@
+"""What Drake is told of a result folder: motors, mechanics, and solid shapes with friction and softness."""
+
+from __future__ import annotations
+
+import platform
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from casadi_hands.errors import DesignError, HandsError
+from casadi_hands.verify.reading.folder import Folder
+from casadi_hands.verify.replays.perturb import Perturbation
+from casadi_hands.verify.replays.simulation import one_line
+from casadi_hands.verify.shapes import Capsule
+
+PRESS = 6.0
+"""Of the object's weight: what presses a fingertip to a patch of PATCH, so that it gives as much as MuJoCo's."""
+
+PATCH = 0.375
+"""Radius of that patch, of the fingertip's: (8/15) 0.375 = (2/3) 0.3, MuJoCo's torsion."""
+
+RELAXATION = 0.02
+"""s, of contacts at the depth of that patch."""
+
+SAGITTA = 0.3
+"""By how much of that depth the triangles of a contact surface may leave the true one."""
+
+_MODULES = (
+    *("common.value", "geometry", "math", "multibody.math", "multibody.parsing", "multibody.plant"),
+    *("multibody.tree", "systems.analysis", "systems.framework"),
+)
+
+
+def load_drake() -> Any:
+    """The package ``pydrake``, with the modules that a replay uses.
+
+    Raises:
+        HandsError: it is not installed, or cannot be loaded; the message says which.
+    """
+    try:
+        for name in _MODULES:
+            import_module(f"pydrake.{name}")
+        return import_module("pydrake")
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] != "pydrake":
+            raise HandsError(f"Drake cannot be loaded ({one_line(error)})") from None
+        system, machine = platform.system(), platform.machine()
+        wheels = {("Linux", "x86_64"), ("Darwin", "arm64")}
+        missing = f"; there is no wheel of it for {system} on {machine}" if (system, machine) not in wheels else ""
+        raise HandsError(f"replay with Drake needs it: pip install 'casadi-hands[drake]'{missing}") from None
+    except Exception as error:
+        raise HandsError(f"Drake cannot be loaded ({one_line(error)})") from None
+
+
+@dataclass(frozen=True)
+class Motor:
+    """A position-controlled joint: N·m/rad, N·m·s/rad, kg·m², N·m."""
+
+    stiffness: float
+    damping: float
+    armature: float
+    effort: float
+
+
+def read_motors(folder: Folder, perturbation: Perturbation) -> tuple[dict[str, Motor], bool]:
+    """Return the motor of every joint in ``scene.xml``, perturbed, and whether the palm moves."""
+    root, factor = _read(folder, "scene.xml"), perturbation.stiffness
+    try:
+        armature = {joint.get("name"): float(joint.get("armature", "0")) for joint in root.iter("joint")}
+        motors = {
+            name: Motor(
+                stiffness=factor * float(drive.attrib["kp"]),
+                damping=factor**0.5 * float(drive.attrib["kv"]),
+                armature=armature[name],
+                effort=perturbation.effort * float(drive.attrib["forcerange"].split()[1]),
+            )
+            for drive in root.iter("position")
+            if (name := drive.get("joint", ""))
+        }
+    except (KeyError, IndexError, ValueError) as error:
+        raise DesignError(f"{folder.path / 'scene.xml'}: a joint's motor is not as solve writes it: {error}") from None
+    if any(name not in motors for name in folder.motion.joint_names):
+        raise DesignError(f"{folder.path / 'scene.xml'}: it lacks a joint or an actuator of this hand")
+    return motors, any(body.get("name") == "palm_target" for body in root.iter("body"))
+
+
+def _read(folder: Folder, name: str) -> ElementTree.Element:
+    try:
+        return ElementTree.parse(folder.path / name).getroot()
+    except (OSError, ElementTree.ParseError) as error:
+        raise DesignError(f"{folder.path / name}: {one_line(error)}") from None
+
+
+def read_mechanics(folder: Folder, name: str) -> str:
+    """Return a URDF file's text without shapes."""
+    root = _read(folder, name)
+    for link in root.iter("link"):
+        for shape in [*link.findall("visual"), *link.findall("collision")]:
+            link.remove(shape)
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def transform(drake: Any, turn: Rotation, position: np.ndarray) -> Any:
+    """Return a pose as Drake has it."""
+    return drake.math.RigidTransform(drake.math.RotationMatrix(turn.as_matrix()), position)
+
+
+class Shapes:
+    """Collision geometry for Drake, with friction and softness.
+
+    Args:
+        drake: the package.
+        plant: to add it to.
+        folder: gives shapes, friction and ground.
+        factor: of every friction coefficient.
+    """
+
+    def __init__(self, drake: Any, plant: Any, folder: Folder, factor: float) -> None:
+        self._drake, self._plant, self._folder = drake, plant, folder
+        tips = [shape.radius for name, body in folder.links.items() if name != "palm" for shape in body.capsules]
+        thin = min(shape.radius for shape in folder.object.capsules)
+        tip = max(tips, default=thin)
+        relative = tip * thin / (tip + thin)
+        self._depth = (PATCH * tip) ** 2 / (2 * relative)
+        self._gradient = PRESS * folder.weight / (np.pi * relative * self._depth**2)
+        self._mu = factor * folder.task.friction
+        self._ground_mu = factor * folder.task.ground.friction if folder.task.ground is not None else 0.0
+        # Drake combines coefficients to 2ab / (a + b): with the larger one on the object, there is a partner for both.
+        self._own = max(self._mu, self._ground_mu)
+
+    def add(self, hand: Any, item: Any) -> None:
+        """Add the shapes of hand and object, and the ground."""
+        geometry, folder, plant = self._drake.geometry, self._folder, self._plant
+        for name, link in folder.links.items():
+            body, friction = plant.GetBodyByName(name, hand), self._partner(self._mu)
+            for k, capsule in enumerate(link.capsules):
+                self._add_capsule(body, f"{name}{k}", capsule, friction)
+            for k, disc in enumerate(link.cylinders):
+                turn = Rotation.from_matrix(disc.placement[:3, :3])
+                shape = geometry.Cylinder(disc.radius, disc.length)
+                self._add(
+                    body, f"{name}_disc{k}", turn, disc.placement[:3, 3], shape, self._rigid(friction, disc.radius)
+                )
+        for k, capsule in enumerate(folder.object.capsules):
+            self._add_capsule(plant.GetBodyByName("object", item), f"object{k}", capsule, self._own)
+        if folder.task.ground is not None:
+            at, rigid = (
+                np.array([0.0, 0.0, folder.task.ground.height]),
+                self._rigid(self._partner(self._ground_mu), 1.0),
+            )
+            self._add(plant.world_body(), "ground", Rotation.identity(), at, geometry.HalfSpace(), rigid)
+
+    def _partner(self, friction: float) -> float:
+        """Return the coefficient that combines with the object's to this one."""
+        return friction * self._own / (2 * self._own - friction) if self._own > 0 else 0.0
+
+    def _add_capsule(self, body: Any, name: str, capsule: Capsule, friction: float) -> None:
+        """Add a capsule, or a sphere where it has no length, soft."""
+        axis = capsule.end - capsule.start
+        length, radius, off = float(np.linalg.norm(axis)), capsule.radius, SAGITTA * self._depth
+        # Drake's meshes have their corners on the surface, so they lie inside; grown, they lie about it.
+        if length > 0.0:
+            edge = min(np.sqrt(8 * radius * off), np.pi / 4 * radius)
+            radius += edge**2 / (12 * radius)
+            shape = self._drake.geometry.Capsule(radius, length)
+            turn = Rotation.align_vectors([axis / length], [[0.0, 0.0, 1.0]])[0]
+        else:
+            halvings = max(round(np.log2(0.5 * radius / off) / 2), 2)
+            edge = 1.01 * np.pi / 2 * radius / 2**halvings
+            radius *= 1 + 0.5 / 4**halvings
+            shape, turn = self._drake.geometry.Sphere(radius), Rotation.identity()
+        properties = self._material(friction)
+        # Two gradients in series make one of half their size; a modulus is the pressure on the capsule's axis.
+        modulus = 2 * self._gradient * capsule.radius
+        self._drake.geometry.AddCompliantHydroelasticProperties(edge, modulus, properties)
+        self._add(body, name, turn, (capsule.start + capsule.end) / 2, shape, properties)
+
+    def _rigid(self, friction: float, edge: float) -> Any:
+        properties = self._material(friction)
+        self._drake.geometry.AddRigidHydroelasticProperties(edge, properties)
+        return properties
+
+    def _material(self, friction: float) -> Any:
+        properties = self._drake.geometry.ProximityProperties()
+        coulomb = self._drake.multibody.plant.CoulombFriction(friction, friction)
+        dissipation = RELAXATION / self._depth
+        self._drake.geometry.AddContactMaterial(dissipation=dissipation, friction=coulomb, properties=properties)
+        return properties
+
+    def _add(self, body: Any, name: str, turn: Rotation, at: np.ndarray, shape: Any, properties: Any) -> None:
+        place = transform(self._drake, turn, at)
+        self._plant.RegisterCollisionGeometry(body, place, shape, name, properties)

@@ -1,0 +1,264 @@
+"""The replay's two sides: what the hand's controller knows of the plan, and the simulated world it acts in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+from scipy.spatial.transform import Rotation, Slerp
+
+from casadi_hands.errors import DesignError, HandsError
+from casadi_hands.verify.figures.dynamics import object_rotation, shoot
+from casadi_hands.verify.reading.folder import Folder
+from casadi_hands.verify.replays.perturb import Perturbation
+from casadi_hands.verify.trajectory import build_trajectory
+
+SQUEEZE, RELEASE = 0.3, 0.2
+"""s before the motion, in which its first commands hold; an object off its place is held there, then let go."""
+
+SUPPORT = 60.0
+"""rad/s, natural frequency of the support that holds a displaced object, on its mass; critically damped."""
+
+
+Observer = Callable[[Any, Any], None]
+"""Called with MuJoCo's model and data after every step."""
+
+
+def load_mujoco() -> Any:
+    """The module ``mujoco``.
+
+    Raises:
+        HandsError: it is not installed, or cannot be loaded; the message says which.
+    """
+    try:
+        return import_module("mujoco")
+    # With itself it loads the OpenGL that MUJOCO_GL names, which raises whatever it likes.
+    except Exception as error:
+        if isinstance(error, ModuleNotFoundError) and error.name == "mujoco":
+            raise HandsError("replay needs MuJoCo: pip install mujoco") from None
+        raise HandsError(
+            f"MuJoCo cannot be loaded ({one_line(error)}); try MUJOCO_GL=egl or MUJOCO_GL=osmesa, or MUJOCO_GL=disable "
+            "without a video"
+        ) from None
+
+
+def one_line(error: Exception) -> str:
+    """An error's words without line breaks."""
+    return " ".join(str(error).split())
+
+
+class Plan:
+    """The motion at every step of the simulation, ``T`` of them from the first sample to the last.
+
+    What the hand is told is linear between samples, as anyone plays it who reads ``motion.npz``.
+
+    Attributes:
+        time: (T,) s.
+        angles, commands: (T, J) rad, planned and told to the motors.
+        palm_position, palm_quaternion: (T, 3) m and (T, 4) [w, x, y, z], world.
+        external_force, external_torque: (T, 3) what the task itself applies to the object, N and N·m, world.
+    """
+
+    def __init__(self, folder: Folder, step: float) -> None:
+        """Rebuild the motion ``step`` seconds apart.
+
+        Raises:
+            DesignError: the motion has no commands.
+        """
+        motion = folder.motion
+        if motion.joint_commands is None:
+            raise DesignError(
+                f"{folder.path / 'motion.npz'}: no joint_commands, since an earlier version wrote it; "
+                f"`casadi-hands solve {folder.path / 'task.yaml'} --from {folder.path}` makes it anew"
+            )
+        path = build_trajectory(folder, shoot(folder))
+        steps = np.arange(round((motion.time[-1] - motion.time[0]) / step) + 1)
+        self.time = time = np.minimum(motion.time[0] + step * steps, motion.time[-1])
+
+        def dense(values: np.ndarray) -> np.ndarray:
+            return np.asarray(make_interp_spline(path.time, values, k=1)(time))
+
+        def coarse(values: np.ndarray) -> np.ndarray:
+            return np.asarray(make_interp_spline(motion.time, values, k=1)(time))
+
+        self.angles, self.commands = coarse(motion.joint_angles), coarse(motion.joint_commands)
+        self.external_force, self.external_torque = coarse(motion.external_force), coarse(motion.external_torque)
+        self.palm_position, self._object_position = coarse(motion.base_position), dense(path.placed["object"][1])
+        turns = coarse(continuous(motion.base_orientation))
+        self.palm_quaternion = turns / np.linalg.norm(turns, axis=1, keepdims=True)
+        item = Slerp(path.time, Rotation.from_matrix(path.placed["object"][0]))(time)
+        self._object_quaternion = item.as_quat(scalar_first=True)
+
+    def __len__(self) -> int:
+        """Return the number of steps."""
+        return len(self.angles)
+
+    def distance(self, i: int, position: np.ndarray) -> float:
+        """Return how far (m) a position (3,), world, is from the object's plan at a step."""
+        return float(np.linalg.norm(position - self._object_position[i]))
+
+    def errors(self, positions: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return distance (m) and angle (deg) of the object's poses, (T, 3) and (T, 4), from its plan.
+
+        Args:
+            positions: m, world.
+            quaternions: [w, x, y, z], world.
+        """
+        away = np.linalg.norm(positions - self._object_position, axis=1)
+        cosine = np.minimum(np.abs(np.sum(quaternions * self._object_quaternion, axis=1)), 1.0)
+        return away, np.rad2deg(2 * np.arccos(cosine))
+
+
+def continuous(quaternions: np.ndarray) -> np.ndarray:
+    """Return the same orientations (S, 4) with signs such that neighbours lie close to each other."""
+    flips = np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0
+    signs = np.cumprod(np.concatenate([[1.0], np.where(flips, -1.0, 1.0)]))
+    signed: np.ndarray = quaternions * signs[:, None]
+    return signed
+
+
+class Simulation:
+    """MuJoCo's model and state of ``scene.xml``, perturbed.
+
+    Attributes:
+        step: s.
+    """
+
+    def __init__(self, folder: Folder, perturbation: Perturbation) -> None:
+        """Load ``scene.xml`` and put everything at its start.
+
+        Raises:
+            DesignError: the scene is missing, unreadable, or not of this hand.
+            HandsError: MuJoCo is not installed or cannot be loaded.
+        """
+        self._mujoco = mujoco = load_mujoco()
+        file = folder.path / "scene.xml"
+        try:
+            self.model = mujoco.MjModel.from_xml_path(str(file))
+        except ValueError as error:
+            raise DesignError(f"{file}: {error}") from None
+        self._find(folder, file)
+        self._bias = np.asarray(perturbation.joint_bias or np.zeros(len(folder.motion.joint_names)))
+        self._displaced, self._ahead = perturbation.displaced, perturbation.squeeze / perturbation.stiffness
+        driven = self._actuators
+        self.model.actuator_gainprm[driven, 0] *= perturbation.stiffness
+        self.model.actuator_biasprm[driven, 1] *= perturbation.stiffness
+        self.model.actuator_biasprm[driven, 2] *= np.sqrt(perturbation.stiffness)
+        self.model.actuator_forcerange[driven] *= perturbation.effort
+        self.model.body_mass[self._object] *= perturbation.mass
+        self.model.body_inertia[self._object] *= perturbation.mass
+        self.model.geom_friction *= perturbation.friction
+        self.data = mujoco.MjData(self.model)
+        mujoco.mj_setConst(self.model, self.data)
+        self._place(folder, perturbation)
+        self.step = float(self.model.opt.timestep)
+
+    def _find(self, folder: Folder, file: Path) -> None:
+        """Look up by name what the replay touches."""
+        kinds, model = self._mujoco.mjtObj, self.model
+        find = partial(self._mujoco.mj_name2id, model)
+        self._object = find(kinds.mjOBJ_BODY, "object")
+        self._links = {name: find(kinds.mjOBJ_BODY, name) for name in folder.links}
+        self._links["ground"] = 0
+        target = find(kinds.mjOBJ_BODY, "palm_target")
+        self._mocap = int(model.body_mocapid[target]) if target >= 0 else -1
+        joints = [find(kinds.mjOBJ_JOINT, name) for name in folder.motion.joint_names]
+        driven = model.actuator_trnid[:, 0].tolist()
+        if self._object < 0 or -1 in self._links.values() or any(joint not in driven for joint in joints):
+            raise DesignError(f"{file}: it lacks the object, a link, a joint or an actuator of this hand")
+        self._actuators = [driven.index(joint) for joint in joints]
+        self._angles = [int(model.jnt_qposadr[joint]) for joint in joints]
+        free = int(model.body_jntadr[self._object])
+        self._pose, self._twist = int(model.jnt_qposadr[free]), int(model.jnt_dofadr[free])
+
+    def _place(self, folder: Folder, perturbation: Perturbation) -> None:
+        """Put everything at the motion's first sample, the object off it as the perturbation says."""
+        self._mujoco.mj_resetDataKeyframe(
+            self.model, self.data, self._mujoco.mj_name2id(self.model, self._mujoco.mjtObj.mjOBJ_KEY, "start")
+        )
+        self.data.qpos[self._angles] = folder.motion.joint_angles[0] + self._bias
+        turn = Rotation.from_rotvec(perturbation.start_turn) * object_rotation(folder)[0]
+        position = folder.motion.object_position[0] + np.asarray(perturbation.start_shift)
+        self._home = position, turn.inv().as_quat(scalar_first=True)
+        self.data.qpos[self._pose : self._pose + 3] = position
+        self.data.qpos[self._pose + 3 : self._pose + 7] = turn.as_quat(scalar_first=True)
+        self._mujoco.mj_forward(self.model, self.data)
+
+    def object_pose(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the object's position (3,) and quaternion (4,) [w, x, y, z], world."""
+        at = self._pose
+        return self.data.qpos[at : at + 3], self.data.qpos[at + 3 : at + 7]
+
+    def touches(self, link: str) -> bool:
+        """Whether the object touches any link of the contact's finger (or the ground)."""
+        finger = link.partition("_link")[0]
+        bodies = {body for name, body in self._links.items() if name.partition("_link")[0] == finger}
+        for contact in self.data.contact:
+            pair = {int(self.model.geom_bodyid[geom]) for geom in contact.geom}
+            if self._object in pair and pair & bodies:
+                return True
+        return False
+
+    def settle(self, plan: Plan, observer: Observer | None) -> None:
+        """Squeeze at the start pose; an object off its place is held there by a soft support, which then lets go."""
+        for i in range(round((SQUEEZE + RELEASE) / self.step)):
+            time = i * self.step
+            share = 1.0 - max(0.0, time - SQUEEZE) / RELEASE if self._displaced else 0.0
+            squeeze = min(time / SQUEEZE, 1.0) if self._displaced else 1.0
+            force, torque = self._support(share) if share else (np.zeros(3), np.zeros(3))
+            # What the fingers do not bear yet: on its springs alone the object would sag and be gripped there.
+            unborne = -(1.0 - squeeze) * self.model.body_mass[self._object] * self.model.opt.gravity
+            self._follow(plan, 0, squeeze)
+            self._advance(plan.external_force[0] + force + unborne, plan.external_torque[0] + torque, observer)
+
+    def _support(self, share: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return a share of the spring force and torque that hold the object at its start."""
+        mass, (position, quaternion) = self.model.body_mass[self._object], self.object_pose()
+        # About every axis by its own inertia: a thin object would be shaken by what serves its length.
+        axes = self._matrix(self._product(quaternion, self.model.body_iquat[self._object]))
+        inertia = (axes * self.model.body_inertia[self._object]) @ axes.T
+        velocity = self.data.qvel[self._twist : self._twist + 3]
+        rate = self._matrix(quaternion) @ self.data.qvel[self._twist + 3 : self._twist + 6]
+        home_position, back_home = self._home
+        off, turned = position - home_position, np.empty(3)
+        self._mujoco.mju_quat2Vel(turned, self._product(quaternion, back_home), 1.0)
+        force = mass * (-(SUPPORT**2) * off - 2 * SUPPORT * velocity)
+        torque = inertia @ (-(SUPPORT**2) * turned - 2 * SUPPORT * rate)
+        return share * force, share * torque
+
+    def _product(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """Return the quaternion (4,) of the second turn followed by the first."""
+        product = np.empty(4)
+        self._mujoco.mju_mulQuat(product, first, second)
+        return product
+
+    def _matrix(self, quaternion: np.ndarray) -> np.ndarray:
+        """Return the rotation (3, 3) of a quaternion (4,)."""
+        matrix = np.empty(9)
+        self._mujoco.mju_quat2Mat(matrix, quaternion)
+        return matrix.reshape(3, 3)
+
+    def play(self, plan: Plan, i: int, push: np.ndarray, observer: Observer | None) -> None:
+        """Drive the hand as planned for a step, and make it; ``push`` (3,) is a force on the object, N, world."""
+        self._follow(plan, i, 1.0)
+        self._advance(plan.external_force[i] + push, plan.external_torque[i], observer)
+
+    def _follow(self, plan: Plan, i: int, squeeze: float) -> None:
+        """Set the motors' set points for a step, with a share of what they are ahead of the planned angles."""
+        ahead = squeeze * self._ahead * (plan.commands[i] - plan.angles[i])
+        self.data.ctrl[self._actuators] = plan.angles[i] + self._bias + ahead
+        if self._mocap >= 0:
+            self.data.mocap_pos[self._mocap] = plan.palm_position[i]
+            self.data.mocap_quat[self._mocap] = plan.palm_quaternion[i]
+
+    def _advance(self, force: np.ndarray, torque: np.ndarray, observer: Observer | None) -> None:
+        self.data.xfrc_applied[self._object, :3] = force
+        self.data.xfrc_applied[self._object, 3:] = torque
+        self._mujoco.mj_step(self.model, self.data)
+        if observer is not None:
+            observer(self.model, self.data)

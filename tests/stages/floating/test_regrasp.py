@@ -1,0 +1,205 @@
+"""Planned regrasps: when a contact lets go, where it takes the object anew, and how its point moves meanwhile."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from casadi_hands.problem.model import Model, Regrasp, sampled_points
+from casadi_hands.problem.si import build_model
+from casadi_hands.stages.floating import stage as floating_stage
+from casadi_hands.stages.floating.gate import passes_gate
+from casadi_hands.stages.floating.regrasp import FARTHEST, held_back, planned_regrasp
+from casadi_hands.stages.floating.stage import BARRIERS, HELD_BACK, FloatingStage, solve_floating
+from casadi_hands.stages.object_motion.values import straight_path
+from casadi_hands.task import parse_task
+from tests.stages.example import made_up_solution
+
+Array = np.ndarray
+
+
+def turning(degrees: float, palm: str = "position: [0, 0, 0.3], facing: [1, 0, 0]") -> Model:
+    """A capsule that turns between two fingers, pushed by a third; three keyframes between its two goals."""
+    return build_model(
+        parse_task(f"""
+object: {{mass: 0.1, shapes: [{{capsule: {{start: [0, 0, -0.03], end: [0, 0, 0.03], radius: 0.02}}}}]}}
+palm: {{radius: 0.06, {palm}}}
+motion:
+  - {{at: 0, position: [0.11, 0, 0.3]}}
+  - {{at: 4, position: [0.11, 0, 0.3], rotation: {{axis: [0, 1, 0], degrees: {degrees}}}}}
+fingers:
+  left: {{touches: [0, 0.02, 0]}}
+  right: {{touches: [0, -0.02, 0]}}
+  top: {{touches: [-0.02, 0, 0.025]}}
+friction: 0.7
+keyframes_between: 3
+""")
+    )
+
+
+def test_a_contact_that_travels_little_stays() -> None:
+    model = turning(95)
+    assert planned_regrasp(model, straight_path(model)) is None
+
+
+def test_only_the_contact_off_the_axis_lets_go_and_takes_the_object_where_it_first_did() -> None:
+    model = turning(170)
+    pose = straight_path(model)
+    plan = planned_regrasp(model, pose)
+    assert plan is not None
+    # 42.5 degrees a keyframe: 127.5 are too many, so it lifts at the second and touches at the third.
+    np.testing.assert_array_equal(np.argwhere(plan.lifted), [[2, 2]])
+    np.testing.assert_allclose(plan.patches[:3], np.tile(model.patches, (3, 1, 1)))
+    turned = Rotation.from_rotvec(pose[3, 3:])
+    direction = turned.apply(plan.patches[3, 2])
+    first = model.patches[2]
+    # The object's axis has another direction then: on its surface, as near as that lets it be.
+    cosine = direction @ first / np.linalg.norm(direction) / np.linalg.norm(first)
+    assert np.arccos(cosine) < np.radians(20)
+    capsule = model.capsules[2]
+    along = np.linspace(0, 1, 10001)[:, None]
+    axis = capsule[:3] + along * (capsule[3:6] - capsule[:3])
+    distance = np.linalg.norm(plan.patches[3, 2] - axis, axis=1).min()
+    assert distance == pytest.approx(capsule[6], abs=1e-6)
+
+
+def ball() -> Model:
+    """A ball between three fingers that turns half around and back, a third of that between keyframes."""
+    return build_model(
+        parse_task("""
+object: {mass: 0.05, shapes: [{sphere: {center: [0, 0, 0], radius: 0.03}}]}
+palm: {radius: 0.05, position: [0, 0, 0.3], facing: [0, 0, -1]}
+motion:
+  - {at: 0, position: [0, 0, 0.2]}
+  - {at: 3, position: [0, 0, 0.2], rotation: {axis: [0, 0, 1], degrees: 180}}
+  - {at: 6, position: [0, 0, 0.2]}
+fingers:
+  thumb: {touches: [0.03, 0, 0]}
+  index: {touches: [-0.015, 0.02598, 0]}
+  middle: {touches: [-0.015, -0.02598, 0]}
+friction: 0.7
+keyframes_between: 2
+""")
+    )
+
+
+def test_contacts_that_cannot_let_go_stay_behind_and_are_carried_back() -> None:
+    model = ball()
+    pose = straight_path(model)
+    patches = held_back(model, pose).patches
+    seen = np.einsum("kij,kcj->kci", Rotation.from_rotvec(pose[:, 3:]).as_matrix(), patches)
+    azimuth = np.degrees(np.arctan2(seen[..., 1], seen[..., 0]))
+    travelled = (azimuth - azimuth[0] + 180) % 360 - 180
+    # The object turns by 60 degrees between keyframes; contacts travel with it until they are 60 from where they began.
+    np.testing.assert_allclose(travelled, np.tile([0, 60, 60, 60, 0, -60, -60], (3, 1)).T, atol=1e-6)
+    np.testing.assert_allclose(np.linalg.norm(seen, axis=2), 1.0, atol=1e-4)
+
+
+def test_a_ball_that_two_fingers_cannot_hold_is_turned_with_contacts_held_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    model, solved, solve = ball(), [], FloatingStage._solved
+    monkeypatch.setattr(FloatingStage, "_solved", lambda self, *a: solved.append(self.model.regrasp) or solve(self, *a))
+    floating = solve_floating(model, parse_task_weights())
+    assert floating.solution.status == "Solve_Succeeded"
+    # Nothing is solved that would leave too few contacts.
+    assert [plan.lifted.any() for plan in solved if plan is not None] == [False]
+    assert floating.model.regrasp is not None
+    assert floating.active.all()
+    assert not floating.model.regrasp.lifted.any()
+    seen = np.einsum("kij,kcj->kci", Rotation.from_rotvec(floating.pose[:, 3:]).as_matrix(), floating.point)
+    np.testing.assert_allclose(np.linalg.norm(seen, axis=2), 1.0, atol=0.1)
+    assert (seen * seen[:1]).sum(axis=2).min() > np.cos(FARTHEST)
+
+
+def test_contacts_held_back_are_solved_with_a_small_barrier_first_and_a_regrasp_with_the_usual_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    model, used = ball(), []
+    before: Any = SimpleNamespace(pose=straight_path(model), active=np.ones((7, 3), bool))
+    before.solution = made_up_solution({})
+    monkeypatch.setattr(FloatingStage, "_solved", lambda self, *given: used.append(given[-1]) or before.solution)
+    monkeypatch.setattr(floating_stage, "passes_gate", lambda *_, **__: False)
+    for lifted in (False, True):
+        plan = held_back(model, before.pose)
+        plan.lifted[3, 0] = lifted
+        assert FloatingStage(replace(model, regrasp=plan)).solve_regrasp(before, parse_task_weights()) is None
+    assert used == [HELD_BACK, BARRIERS]
+    assert HELD_BACK[0].mu_init < min(barrier.mu_init for barrier in BARRIERS)
+    assert HELD_BACK[1:] == BARRIERS
+
+
+def test_what_counts_is_the_way_seen_from_the_palm() -> None:
+    # A palm that turns with the object sees no contact travel.
+    still, facing = turning(170), "facing: [{}, 0, {}]"
+    poses = ", ".join(
+        f"{{at: {k}, position: [0, 0, 0.3], {facing.format(np.cos(a), -np.sin(a))}}}"
+        for k, a in ((k, np.radians(42.5 * k)) for k in range(1, 5))
+    )
+    along = turning(170, f"position: [0, 0, 0.3], facing: [1, 0, 0], motion: [{poses}]")
+    pose = straight_path(still)
+    assert planned_regrasp(still, pose) is not None
+    assert planned_regrasp(along, straight_path(along)) is None
+    assert np.degrees(FARTHEST) == pytest.approx(100)
+
+
+def lifted_model(model: Model) -> Model:
+    lifted = np.zeros((5, 3), bool)
+    lifted[2, 2] = True
+    patches = model.keyframe_patches.copy()
+    patches[3:, 2] = [0.4, 0, -0.5]
+    return replace(model, regrasp=Regrasp(lifted, patches))
+
+
+def test_a_contact_point_rests_where_it_lifts_and_touches() -> None:
+    model = lifted_model(turning(170))
+    assert model.regrasp is not None
+    points = sampled_points(model, model.regrasp.patches)
+    at = model.schedule.keyframe_samples
+    np.testing.assert_allclose(points[: at[2] + 1, 2], np.tile(model.patches[2], (at[2] + 1, 1)), atol=1e-12)
+    np.testing.assert_allclose(points[at[3] :, 2], np.tile([0.4, 0, -0.5], (len(points) - at[3], 1)), atol=1e-12)
+    assert np.linalg.norm(np.diff(points[at[2] : at[3] + 1, 2], axis=0), axis=1).min() > 1e-3
+    # Before it touches it has not slid: the sample one step earlier stands for the touch itself.
+    before = model.point_spline(2, -1.0) @ model.regrasp.patches[:, 2]
+    np.testing.assert_allclose(before[at[3]], [0.4, 0, -0.5], atol=1e-12)
+    others = model.point_spline(0)
+    np.testing.assert_array_equal(others, model.schedule.spline())
+
+
+def test_two_contacts_pass_as_a_pivot_only_while_one_lifts() -> None:
+    model = turning(170)
+    values = {
+        "pose": np.tile(straight_path(model)[0], (5, 1)),
+        "point": model.keyframe_patches.reshape(5, -1),
+        "activity": np.ones((5, 3)),
+    }
+    assert passes_gate(model, values)
+    values["activity"] = values["activity"].copy()
+    values["activity"][2, 2] = 0
+    assert not passes_gate(model, values)
+    assert passes_gate(model, values, pivots=True)
+    values["activity"][2] = 0
+    assert not passes_gate(model, values, pivots=True)
+
+
+def test_the_floating_motion_breaks_its_contact_and_holds_the_object_meanwhile() -> None:
+    model = turning(170)
+    weights = parse_task_weights()
+    floating = solve_floating(model, weights)
+    np.testing.assert_array_equal(floating.active[:, 2], [True, True, False, True, True])
+    assert floating.active[:, :2].all()
+    assert floating.model.regrasp is not None
+    assert floating.runs[-1][0] == "regrasp"
+    moved = np.linalg.norm(floating.point[3, 2] - floating.point[1, 2])
+    assert moved > 0.5
+    still = np.linalg.norm(np.diff(floating.point[3:, 2], axis=0), axis=1).max()
+    assert still < 0.2 * moved
+
+
+def parse_task_weights() -> dict[str, float]:
+    from casadi_hands.task.weights import Weights
+
+    return dict(Weights().floating)
