@@ -1,8 +1,20 @@
 """Named variables, parameters, terms and constraints, assembled into one IPOPT solver with exact derivatives."""
 
-from casadi_hands.nlp.kernel import Constraint, Kernel
+from casadi_hands.nlp.kernel import Constraint, Kernel, Term, Weight
 from casadi_hands.nlp.layout import Layout, Parameter, Rows
 from casadi_hands.nlp.problem import Problem
 from casadi_hands.nlp.solver import Options, Solution, Solver
 
-__all__ = ["Constraint", "Kernel", "Layout", "Options", "Parameter", "Problem", "Rows", "Solution", "Solver"]
+__all__ = [
+    "Constraint",
+    "Kernel",
+    "Layout",
+    "Options",
+    "Parameter",
+    "Problem",
+    "Rows",
+    "Solution",
+    "Solver",
+    "Term",
+    "Weight",
+]

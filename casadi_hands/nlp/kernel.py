@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
 
 import casadi as ca
 from casadi import SX
@@ -29,6 +30,41 @@ class Local:
     def size(self) -> int:
         """Number of entries."""
         return int(self.symbol.numel())
+
+
+class Weight(NamedTuple):
+    """What a term weighs in a stage.
+
+    Attributes:
+        default: one number, or one for each annealing step.
+        per: what the term is a mean over: keyframes, goals, samples, knots; ``once``: it is taken as it is.
+    """
+
+    default: float | tuple[float, float, float]
+    per: Literal["keyframe", "goal", "sample", "knot", "once"] = "keyframe"
+
+
+@dataclass(frozen=True)
+class Term:
+    """A cost term, declared once: the schema's weights, the documents' tables and the cost report are made of this.
+
+    Attributes:
+        name: unique among terms.
+        about: what costs, in a few words.
+        equation: where it comes from.
+        unit: of the residual.
+        form: ``square``: the sum of squares of the residual costs; ``sum``: the plain sum of non-negative values does.
+        weights: by stage, what it weighs there.
+        weighs_as: the term whose weight it takes, where it has none of its own.
+    """
+
+    name: str
+    about: str = ""
+    equation: str = ""
+    unit: str = ""
+    form: Literal["square", "sum"] = "square"
+    weights: Mapping[str, Weight] = field(default_factory=dict)
+    weighs_as: str = ""
 
 
 @dataclass(frozen=True)
@@ -67,6 +103,7 @@ class Kernel:
         self._parameters: list[Local] = []
         self.terms: dict[str, SX] = {}
         self.constraints: dict[str, SX] = {}
+        self.declared_terms: dict[str, Term] = {}
         self.declared: dict[str, Constraint] = {}
 
     def variable(self, name: str, size: int, quantity: str = "", place: int | None = None) -> SX:
@@ -91,11 +128,19 @@ class Kernel:
         where.append(self.locals[name])
         return self.locals[name].symbol
 
-    def cost(self, name: str, residual: SX, form: Literal["square", "sum"] = "square") -> None:
-        """Add a cost: the sum of squares of a residual, or the plain sum of non-negative values."""
+    def cost(self, term: Term, residual: SX, scenario: str = "") -> None:
+        """Add a cost: the sum of squares of a residual, or the plain sum of non-negative values, as the term says.
+
+        Args:
+            term: as declared.
+            residual: (n,).
+            scenario: appended to the term's name, where a kernel stands for another scenario than the first.
+        """
+        name = term.name + scenario
         if name in self.terms:
             raise KeyError(f"kernel '{self.name}' already has a term '{name}'")
-        self.terms[name] = ca.sumsqr(residual) if form == "square" else ca.sum(residual)
+        self.terms[name] = ca.sumsqr(residual) if term.form == "square" else ca.sum(residual)
+        self.declared_terms[name] = term
 
     def constrain(self, declared: Constraint, expression: SX) -> None:
         """Add a constraint (n,); its bounds are given when the kernel is bound."""

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from casadi_hands.nlp.arguments import Argument, arguments_by_name, check_arguments
 from casadi_hands.nlp.assembly import Gathering, Reads, scatter_hessian, scatter_jacobian, together
 from casadi_hands.nlp.derivatives import KernelFunctions, kernel_functions
-from casadi_hands.nlp.kernel import Kernel
+from casadi_hands.nlp.kernel import Kernel, Term
 from casadi_hands.nlp.layout import Label, Layout, Parameter, Rows
 
 Vector = NDArray[np.float64]
@@ -189,6 +189,11 @@ class Problem:
     def terms(self) -> list[str]:
         """Names of all cost terms."""
         return list(dict.fromkeys(term for bound in self._bound for term in bound.kernel.terms))
+
+    @property
+    def declared_terms(self) -> dict[str, Term]:
+        """All cost terms as declared, by their names in the problem."""
+        return {name: term for bound in self._bound for name, term in bound.kernel.declared_terms.items()}
 
     def functions(self) -> dict[str, Function]:
         """For nlpsol ``nlp`` (x, p) -> (f, g), ``grad_f``, ``jac_g`` and ``hess_lag``; ``terms`` -> (f, g, terms)."""

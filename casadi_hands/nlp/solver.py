@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from casadi_hands.nlp.kernel import Term
 from casadi_hands.nlp.problem import Problem
 from casadi_hands.nlp.watch import Watch
 
@@ -72,6 +73,7 @@ class Solution:
         status: IPOPT's own words; never taken as proof.
         iterations: number of iterations; 0 where IPOPT did not start.
         seconds: wall time.
+        declared: cost term -> as it was declared.
     """
 
     values: dict[str, Vector]
@@ -82,6 +84,7 @@ class Solution:
     status: str
     iterations: int
     seconds: float
+    declared: dict[str, Term] = field(default_factory=dict, repr=False)
 
     @property
     def violations(self) -> dict[str, float]:
@@ -216,6 +219,7 @@ class Solver:
             # CasADi sets the count with the record of iterations; without one it is whatever memory held.
             iterations=int(stats["iter_count"]) if "iterations" in stats else 0,
             seconds=seconds,
+            declared=problem.declared_terms,
         )
 
 

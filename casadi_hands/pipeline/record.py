@@ -13,6 +13,7 @@ from typing import Any
 from casadi_hands.export.design import Design
 from casadi_hands.nlp import Solution
 from casadi_hands.task import Task
+from casadi_hands.terms.catalogue import single
 
 STAGES = ("floating", "synthesis", "whole_hand", "refine")
 
@@ -80,9 +81,8 @@ class Record:
         """Keep the weights and weighted values of a stage's terms; of annealed weights the last."""
         costs = {}
         for name, value in solution.terms.items():
-            weight = weights.get(name.removesuffix("_perturbed"), 0.0)
-            weight = weight[-1] if isinstance(weight, tuple | list) else weight
-            costs[name] = {"weight": float(weight), "value": value}
+            term = solution.declared[name]
+            costs[name] = {"weight": float(single(weights[term.weighs_as or term.name])), "value": value}
         self.update(costs={**self.design.costs, stage: costs})
 
     def complete(self, design: Design) -> Design:

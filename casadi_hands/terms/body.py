@@ -2,10 +2,72 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as ca
 from casadi import SX
 
 from casadi_hands.motion import angle_squared
+from casadi_hands.nlp import Term, Weight
+
+LINEAR_MOMENTUM = Term("linear_momentum", "Newton's law", "eq. 2.6", "m·g", weights={"floating": Weight(10.0)})
+ANGULAR_MOMENTUM = Term("angular_momentum", "Euler's law", "eq. 2.5", "m·g·length", weights={"floating": Weight(10.0)})
+TASK = Term("task", "Goals", "eq. 2.9", "length² and rad²", "sum", {"floating": Weight(50.0, "goal")})
+TOOL = replace(TASK, about="A drawing's path", equation="fig. 3.4", unit="length", form="square")
+OBJECT_ACCELERATION = Term(
+    "object_acceleration",
+    "Object's acceleration, a moving palm's taken off",
+    "eq. 2.14",
+    "length/s²",
+    weights={"floating": Weight(0.1)},
+)
+OBJECT_ANGULAR_ACCELERATION = Term(
+    "object_angular_acceleration",
+    "Object's rate of spin",
+    "eq. 2.15",
+    "m·g·length/s",
+    weights={"floating": Weight(1.0)},
+)
+PATH = Term(
+    "path",
+    "Keyframes off the straight line between goals",
+    "",
+    "length and rad",
+    weights={"floating": Weight(3.0)},
+)
+# The refinement's.
+KNOT_ACCELERATION = Term(
+    "object_acceleration",
+    "Object's acceleration",
+    "eq. 2.14",
+    "length/s² and rad/s²",
+    weights={"refine": Weight(1e-2, "knot")},
+)
+OBJECT_JERK = Term(
+    "object_jerk",
+    "Change of the object's acceleration",
+    "",
+    "length/s³ and rad/s³",
+    weights={"refine": Weight(1e-3, "knot")},
+)
+FORCE_CHANGE = Term(
+    "force_change",
+    "Change of the contact forces",
+    "",
+    "m·g",
+    weights={"refine": Weight(0.5, "knot")},
+)
+STAY_PATH = Term(
+    "stay_path",
+    "Object off the motion it begins with",
+    "",
+    "length and rad",
+    weights={"refine": Weight(1.0, "knot")},
+)
+GOAL = Term("goal", "Goals", "eq. 2.9", "length and rad", weights={"refine": Weight(300.0, "knot")})
+DISTURBED_FORCE = Term(
+    "force_regularisation", "Forces under a disturbance", "eq. 2.7", "m·g", weights={"refine": Weight(1e-3, "knot")}
+)
 
 
 def linear_momentum(forces: SX, activity: SX, gravity: SX, external: SX, acceleration: SX, inertial: SX) -> SX:

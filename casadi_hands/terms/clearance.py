@@ -6,8 +6,21 @@ import casadi as ca
 from casadi import SX
 
 from casadi_hands.geometry import penalty_spline, point_disc_distance, segment_distance
+from casadi_hands.nlp import Term, Weight
 
 _ROUNDING = 1e-3  # half the width of the spline's transition, half extents
+
+COLLISION = Term(
+    "collision",
+    "Bodies overlapping",
+    "eq. 2.20",
+    "length",
+    "sum",
+    {"synthesis": Weight((0.1, 5.0, 100.0), "sample"), "whole_hand": Weight(100.0)},
+)
+PALM_CLEARANCE = Term(
+    "palm_clearance", "Object and palm overlapping", "section 3.2.3", "length", "sum", {"floating": Weight(100.0)}
+)
 
 
 def overlap(depth: SX) -> SX:

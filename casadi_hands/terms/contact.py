@@ -2,10 +2,86 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as ca
 from casadi import SX
 
 from casadi_hands.geometry import norm, project_to_capsule, soft_exponential
+from casadi_hands.nlp import Term, Weight
+
+FORCE_REGULARISATION = Term(
+    "force_regularisation", "Forces that act", "eq. 2.7", "m·g", weights={"floating": Weight(0.01)}
+)
+RAW_FORCE = Term(
+    "raw_force", "Forces whether their contact is active or not", "", "m·g", weights={"floating": Weight(0.01)}
+)
+FRICTION_CONE = Term("friction_cone", "Friction", "eq. 2.8", "", "sum", {"floating": Weight(0.1)})
+CONTACT_ON_OBJECT = Term(
+    "contact_on_object",
+    "Contact on the object's surface",
+    "eq. 2.10",
+    "m·g·length²",
+    "sum",
+    {"floating": Weight(100.0), "whole_hand": Weight(100.0)},
+)
+SLIP_ON_OBJECT = Term(
+    "slip_on_object",
+    "Change of the gap to the object",
+    "eq. 2.12",
+    "m·g·length/s",
+    weights={"floating": Weight(100.0), "whole_hand": Weight(10.0)},
+)
+TANGENTIAL_SLIP = Term(
+    "tangential_slip", "Slip of the contact along the object", "", "m·g·length/s", weights={"floating": Weight(10.0)}
+)
+CONTACT_ACCELERATION = Term(
+    "contact_acceleration", "Contacts' acceleration", "eq. 2.13", "length/s", weights={"floating": Weight(0.01)}
+)
+CONTACT_PATCH = Term(
+    "contact_patch", "Contacts away from where the task put them", "", "length", weights={"floating": Weight(1.0)}
+)
+# The ground's contact takes the weights of the fingers' ones.
+GROUND_FRICTION_CONE = replace(FRICTION_CONE, name="ground_friction_cone", weights={}, weighs_as="friction_cone")
+CONTACT_ON_GROUND = replace(CONTACT_ON_OBJECT, name="contact_on_ground", weights={}, weighs_as="contact_on_object")
+SLIP_ON_GROUND = replace(TANGENTIAL_SLIP, name="slip_on_ground", weights={}, weighs_as="tangential_slip")
+CONTACT_ON_FINGER = Term(
+    "contact_on_finger",
+    "Contact on the fingertip's surface",
+    "eq. 2.19",
+    "m·g·length²",
+    "sum",
+    {"whole_hand": Weight(100.0)},
+)
+SLIP_ON_FINGER = Term(
+    "slip_on_finger",
+    "Slip of the contact along the fingertip",
+    "",
+    "m·g·length/s",
+    weights={"whole_hand": Weight(10.0)},
+)
+FRICTION_CONE_HAND = replace(
+    FRICTION_CONE,
+    name="friction_cone_hand",
+    about="Friction against the fingertip's normal",
+    weights={"whole_hand": Weight(0.1)},
+)
+# The refinement's.
+STAY_POINT = Term(
+    "stay_point", "Contacts away from where they begin", "", "length", weights={"refine": Weight(1.0, "knot")}
+)
+STAY_FORCE = Term(
+    "stay_force", "Forces other than those it begins with", "", "m·g", weights={"refine": Weight(0.02, "knot")}
+)
+FRICTION_MARGIN = Term(
+    "friction_margin",
+    "Fourth power of the friction in use",
+    "eq. 2.8",
+    "",
+    weights={"refine": Weight(0.02, "knot")},
+)
+SLIP = Term("slip", "Slip from knot to knot", "eq. 2.12", "length/s", weights={"refine": Weight(3.0, "knot")})
+SPIN = Term("spin", "Spin about the contact's normal", "", "rad/s", weights={"refine": Weight(0.1, "knot")})
 
 
 def friction_cone(force: SX, inward_normal: SX, friction: SX, sharpness: SX) -> SX:
@@ -56,3 +132,20 @@ def surface(point: SX, capsule: SX) -> tuple[SX, SX, SX]:
         capsule: (7,) start, end and radius in the point's frame.
     """
     return project_to_capsule(point, capsule[:3], capsule[3:6], capsule[6])
+
+
+def friction_in_use(pressing: SX, across: SX, friction: SX) -> SX:
+    """Square of the share of friction in use, softened where nothing presses.
+
+    Args:
+        pressing: normal force, m·g.
+        across: square of the tangential force, (m·g)².
+        friction: μ.
+    """
+    return across / (friction * pressing + 0.1) ** 2
+
+
+def spin(change: SX, normal: SX, step: SX) -> SX:
+    """Rate of turn about a normal (3,), rad/s, of a change of orientation (3, 3) in one step."""
+    turned = ca.vertcat(change[2, 1] - change[1, 2], change[0, 2] - change[2, 0], change[1, 0] - change[0, 1]) / 2
+    return ca.dot(turned, normal) / step

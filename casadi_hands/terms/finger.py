@@ -2,15 +2,99 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as ca
 from casadi import SX
 
 from casadi_hands.geometry import norm, penalty_spline
+from casadi_hands.nlp import Term, Weight
 
 # Of the Jacobian's singular values, lengths per rad: the lever below which a joint does not push.
 NULL_SPACE_DAMPING = 0.02
 _TORQUE_DAMPING = 1e-3  # λ of eq. A.5
 _ROUNDING = 1e-3  # half the width of the spline's transition, half extents or rad
+
+TIP_TARGET = Term(
+    "tip_target",
+    "Fingertip at its contact",
+    "eq. 2.18",
+    "length",
+    weights={"synthesis": Weight((50.0, 10.0, 50.0))},
+)
+LENGTH = Term("length", "Length of links", "eq. 2.21", "length", weights={"synthesis": Weight(0.1, "once")})
+MINIMUM_LENGTH = Term(
+    "minimum_length",
+    "Links outside the allowed lengths",
+    "eq. 2.22",
+    "length",
+    "sum",
+    {"synthesis": Weight(1.0, "once")},
+)
+NULL_SPACE = Term(
+    "null_space",
+    "Forces that no joint actuates",
+    "eq. 2.23",
+    "m·g",
+    "sum",
+    {"synthesis": Weight(1.0), "whole_hand": Weight(1.0)},
+)
+TORQUE = Term(
+    "torque",
+    "Joint torques",
+    "eq. 2.24",
+    "m·g·length",
+    weights={"synthesis": Weight(0.05), "whole_hand": Weight(0.05)},
+)
+FINGER_BASE = Term(
+    "finger_base", "Fingers off the palm", "eq. 2.25", "length", "sum", {"synthesis": Weight(1.0, "once")}
+)
+FINGERTIP_ACCELERATION = Term(
+    "fingertip_acceleration",
+    "Acceleration of free fingertips",
+    "eq. 2.26",
+    "length/s²",
+    weights={"synthesis": Weight(0.001)},
+)
+JOINT_LIMITS = Term("joint_limits", "Joints beyond their limits", "eq. 2.27", "rad", "sum", {"synthesis": Weight(1.0)})
+# The whole-hand stage's.
+JOINT_LIMITS_SQUARED = replace(JOINT_LIMITS, form="square", weights={"whole_hand": Weight(1.0)})
+FINGER_ACCELERATION = Term(
+    "finger_acceleration",
+    "Acceleration of every fingertip",
+    "eq. 2.26",
+    "length/s²",
+    weights={"whole_hand": Weight(0.001)},
+)
+BASE_ACCELERATION = Term(
+    "base_acceleration",
+    "Acceleration of a palm that may move",
+    "",
+    "length/s² and rad/s²",
+    weights={"whole_hand": Weight(0.01)},
+)
+# The refinement's.
+PASSIVE_FORCE = Term(
+    "passive_force", "Force borne by the structure", "eq. 2.23", "m·g", weights={"refine": Weight(3.0, "knot")}
+)
+JOINT_ACCELERATION = Term(
+    "joint_acceleration", "Joints' acceleration", "", "rad/s²", weights={"refine": Weight(1e-3, "knot")}
+)
+JOINT_JERK = Term(
+    "joint_jerk", "Change of joints' acceleration", "", "rad/s³", weights={"refine": Weight(3e-3, "knot")}
+)
+# A large weight, or fingers grow long and turn elsewhere for next to nothing.
+STAY_DESIGN = Term(
+    "stay_design",
+    "Morphology other than the synthesis found",
+    "",
+    "length and rad",
+    weights={"refine": Weight(5.0, "knot")},
+)
+# No weight but in restorations.
+PROXIMITY = Term(
+    "anchor", "Proximal term of a restoration", "", "length, rad and 0.1 m·g", weights={"refine": Weight(0.0, "knot")}
+)
 
 
 def null_space_force(jacobian: SX, force: SX, damping: float = NULL_SPACE_DAMPING) -> SX:

@@ -42,16 +42,19 @@ def dynamics(contacts: int, suffix: str = "", regularise: bool = True) -> Kernel
     rotation = rotation_matrix(now[1])
     inertial_torque = inertial * body.gyroscopic(inertia, omega, alpha)
     kernel.cost(
-        "linear_momentum" + suffix,
+        body.LINEAR_MOMENTUM,
         body.linear_momentum(ca.mtimes(rotation, forces), activity, gravity, external, acceleration, inertial),
+        suffix,
     )
     local_torque = ca.mtimes(rotation.T, external_torque)
     kernel.cost(
-        "angular_momentum" + suffix, body.angular_momentum(points, forces, activity, local_torque, inertial_torque)
+        body.ANGULAR_MOMENTUM,
+        body.angular_momentum(points, forces, activity, local_torque, inertial_torque),
+        suffix,
     )
     if regularise:
-        kernel.cost("object_acceleration", acceleration - kernel.parameter("carried_acceleration", 3))
-        kernel.cost("object_angular_acceleration", inertial_torque / step)
+        kernel.cost(body.OBJECT_ACCELERATION, acceleration - kernel.parameter("carried_acceleration", 3))
+        kernel.cost(body.OBJECT_ANGULAR_ACCELERATION, inertial_torque / step)
     return kernel
 
 
@@ -70,15 +73,15 @@ def contact_forces(suffix: str = "") -> Kernel:
     )
     projection, normal, _ = contact.surface(point, capsule)
     projection_before, _, _ = contact.surface(before, capsule)
-    kernel.cost("force_regularisation" + suffix, activity * force)
-    kernel.cost("raw_force" + suffix, force)
+    kernel.cost(contact.FORCE_REGULARISATION, activity * force, suffix)
+    kernel.cost(contact.RAW_FORCE, force, suffix)
     cone = contact.friction_cone(force, -normal, friction, sharpness)
-    kernel.cost("friction_cone" + suffix, activity * cone, "sum")
+    kernel.cost(contact.FRICTION_CONE, activity * cone, suffix)
     kernel.constrain(limits.IN_CONE, contact.cone_margin(force, -normal, friction))
-    kernel.cost("contact_on_object" + suffix, contact.off_surface(force, activity, point, projection), "sum")
+    kernel.cost(contact.CONTACT_ON_OBJECT, contact.off_surface(force, activity, point, projection), suffix)
     gaps = (projection - point, projection_before - before)
-    kernel.cost("slip_on_object" + suffix, contact.gap_rate(force, activity, *gaps, step))
-    kernel.cost("tangential_slip" + suffix, contact.slip(force, activity, point, before, step))
+    kernel.cost(contact.SLIP_ON_OBJECT, contact.gap_rate(force, activity, *gaps, step), suffix)
+    kernel.cost(contact.TANGENTIAL_SLIP, contact.slip(force, activity, point, before, step), suffix)
     return kernel
 
 
@@ -88,8 +91,8 @@ def contact_motion() -> Kernel:
     kernel = Kernel("contact_motion")
     before, point, after = (kernel.variable(f"point{i}", 3, "point", i) for i in range(3))
     patch, step = kernel.parameter("patch", 3), kernel.parameter("step")
-    kernel.cost("contact_acceleration", contact.acceleration(before, point, after, step))
-    kernel.cost("contact_patch", point - patch)
+    kernel.cost(contact.CONTACT_ACCELERATION, contact.acceleration(before, point, after, step))
+    kernel.cost(contact.CONTACT_PATCH, point - patch)
     return kernel
 
 
@@ -108,18 +111,18 @@ def ground_contact(suffix: str = "") -> Kernel:
     in_world = position + ca.mtimes(rotation, point)
     in_world_before = position_before + ca.mtimes(rotation_matrix(quaternion_before), point)
     projection, normal, _ = contact.surface(point, capsule)
-    kernel.cost("force_regularisation" + suffix, activity * force)
-    kernel.cost("raw_force" + suffix, force)
+    kernel.cost(contact.FORCE_REGULARISATION, activity * force, suffix)
+    kernel.cost(contact.RAW_FORCE, force, suffix)
     upward_in_object = rotation.T[:, 2]
     cone = contact.friction_cone(force, upward_in_object, friction, sharpness)
-    kernel.cost("ground_friction_cone" + suffix, activity * cone, "sum")
+    kernel.cost(contact.GROUND_FRICTION_CONE, activity * cone, suffix)
     kernel.constrain(limits.IN_CONE, contact.cone_margin(force, upward_in_object, friction))
     off = contact.off_surface(force, activity, point, projection)
-    kernel.cost("contact_on_object" + suffix, off, "sum")
+    kernel.cost(contact.CONTACT_ON_OBJECT, off, suffix)
     above = contact.off_surface(force, activity, in_world[2], height)
     tilted = contact.off_surface(force, activity, normal, -upward_in_object)
-    kernel.cost("contact_on_ground" + suffix, above + 0.1 * tilted, "sum")
-    kernel.cost("slip_on_ground" + suffix, contact.slip(force, activity, in_world, in_world_before, step))
+    kernel.cost(contact.CONTACT_ON_GROUND, above + 0.1 * tilted, suffix)
+    kernel.cost(contact.SLIP_ON_GROUND, contact.slip(force, activity, in_world, in_world_before, step), suffix)
     return kernel
 
 
@@ -131,7 +134,8 @@ def goal_pose() -> Kernel:
     reference = kernel.parameter("reference", 4)
     target, vector = kernel.parameter("target", 3), kernel.parameter("vector", 3, "goal_vector")
     position, turned = placed(pose, reference)
-    kernel.cost("task", body.task_pose(position, turned, target, multiply(exponential(vector), reference)), "sum")
+    goal = multiply(exponential(vector), reference)
+    kernel.cost(body.TASK, body.task_pose(position, turned, target, goal))
     return kernel
 
 
@@ -143,7 +147,7 @@ def goal_point() -> Kernel:
     reference = kernel.parameter("reference", 4)
     target, tool = kernel.parameter("target", 3), kernel.parameter("tool", 3)
     position, quaternion = placed(pose, reference)
-    kernel.cost("task", body.task_point(position, rotation_matrix(quaternion), tool, target))
+    kernel.cost(body.TOOL, body.task_point(position, rotation_matrix(quaternion), tool, target))
     return kernel
 
 
@@ -155,7 +159,7 @@ def straight_path() -> Kernel:
     """
     kernel = Kernel("straight_path")
     pose, straight = kernel.variable("pose", 6), kernel.parameter("straight", 6)
-    kernel.cost("path", pose - straight)
+    kernel.cost(body.PATH, pose - straight)
     return kernel
 
 
@@ -179,7 +183,7 @@ def palm_clearance(moves: bool) -> Kernel:
         distance = point_disc_distance(palm.sees(point), palm_radius) - capsule[6]
         costs.append(clearance.overlap(margin - distance))
         costs.append(clearance.overlap(ground - (point[2] - capsule[6])))
-    kernel.cost("palm_clearance", ca.vertcat(*costs), "sum")
+    kernel.cost(clearance.PALM_CLEARANCE, ca.vertcat(*costs))
     return kernel
 
 

@@ -17,11 +17,6 @@ CLEARANCE = 0.02  # half extents, asked of object and palm, and in exact motions
 GOAL_TOLERANCE = 5e-4  # half extents and rad, each coordinate: the task's cost alone gives way to slow accelerations
 MOST_FORCE = 20.0  # m·g, a bound on each component of a contact force
 MOST_TURN = 5.6  # rad, up to where the exponential map's coordinates are used
-_WEIGHT_OF = {  # terms of the ground's contact take the weights of the fingers' ones
-    "ground_friction_cone": "friction_cone",
-    "contact_on_ground": "contact_on_object",
-    "slip_on_ground": "tangential_slip",
-}
 
 
 def least_contacts(model: Model) -> int:
@@ -110,12 +105,11 @@ def object_parameters(model: Model) -> dict[str, Array | float]:
 
 
 def term_weights(problem: Problem, model: Model, weights: Mapping[str, float]) -> dict[str, float]:
-    """Weight parameters of a stage: all terms but the task's are divided by the number of keyframes."""
+    """Weight parameters of a stage: each a mean over the goals, or a drawing's samples, or the keyframes."""
     keyframes, samples, _ = sizes(model)
-    count = samples if model.tool is not None else len(model.goal_positions)
+    goals = samples if model.tool is not None else len(model.goal_positions)
     values = {}
-    for term in problem.terms:
-        plain = term.removesuffix("_perturbed")
-        weight = float(weights[_WEIGHT_OF.get(plain, plain)])
-        values[f"weight.{term}"] = weight / (count if plain == "task" else keyframes)
+    for name, term in problem.declared_terms.items():
+        per_goal = any(weight.per == "goal" for weight in term.weights.values())
+        values[f"weight.{name}"] = float(weights[term.weighs_as or term.name]) / (goals if per_goal else keyframes)
     return {**values, "sharpness": float(weights["friction_sharpness"])}

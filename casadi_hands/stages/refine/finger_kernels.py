@@ -18,6 +18,7 @@ from casadi_hands.nlp import Kernel
 from casadi_hands.stages.whole_hand.kernels import distances
 from casadi_hands.terms import clearance, finger
 from casadi_hands.terms import constraints as limits
+from casadi_hands.terms import contact as contact_terms
 
 LEVER = 0.06  # half extents/rad: forces that need a shorter lever than about this count as not supplied
 
@@ -110,10 +111,10 @@ def contact(joints: int, limited: bool) -> Kernel:
     kernel.constrain(limits.ON_OBJECT, touch.off_object)
     kernel.constrain(limits.ON_LINK, touch.off_link)
     pressing, across, passive = _hold(kernel, touch, force, friction, limited)
-    kernel.cost("passive_force", passive)
-    kernel.cost("stay_point", tie * (point - wanted_point))
-    kernel.cost("stay_force", force - wanted_force)
-    kernel.cost("friction_margin", across / (friction * pressing + 0.1) ** 2)
+    kernel.cost(finger.PASSIVE_FORCE, passive)
+    kernel.cost(contact_terms.STAY_POINT, tie * (point - wanted_point))
+    kernel.cost(contact_terms.STAY_FORCE, force - wanted_force)
+    kernel.cost(contact_terms.FRICTION_MARGIN, contact_terms.friction_in_use(pressing, across, friction))
     return kernel
 
 
@@ -127,7 +128,7 @@ def disturbed_contact(joints: int, limited: bool) -> Kernel:
     scene, friction = Scene.declare(kernel), kernel.parameter("friction")
     touch = scene.touch(pose, point, angles, symbols)
     _, _, passive = _hold(kernel, touch, force, friction, limited, disturbed=True)
-    kernel.cost("passive_force", passive)
+    kernel.cost(finger.PASSIVE_FORCE, passive)
     return kernel
 
 
@@ -140,7 +141,7 @@ def actuated(joints: int) -> Kernel:
     force = kernel.variable("force", 3)
     passive = _passive(Scene.declare(kernel).touch(pose, point, angles, symbols), force)
     kernel.constrain(limits.ACTUATED, passive)
-    kernel.cost("passive_force", passive)
+    kernel.cost(finger.PASSIVE_FORCE, passive)
     return kernel
 
 
@@ -188,12 +189,11 @@ def rolling(joints: int) -> Kernel:
     first, second = (ca.mtimes(before.rotation, t) for t in tangents(before.normal, helper))
     slip = ca.vertcat(ca.dot(first, over_object - over_link), ca.dot(second, over_object - over_link))
     kernel.constrain(limits.NO_SLIP, slip)
-    kernel.cost("slip", slip / step)
+    kernel.cost(contact_terms.SLIP, slip / step)
     relative_before = ca.mtimes(before.placed.tip_rotation.T, before.rotation)
     relative_after = ca.mtimes(after.placed.tip_rotation.T, after.rotation)
     change = ca.mtimes(relative_before.T, relative_after)
-    turned = ca.vertcat(change[2, 1] - change[1, 2], change[0, 2] - change[2, 0], change[1, 0] - change[0, 1]) / 2
-    kernel.cost("spin", ca.dot(turned, before.normal) / step)
+    kernel.cost(contact_terms.SPIN, contact_terms.spin(change, before.normal, step))
     return kernel
 
 
@@ -258,7 +258,7 @@ def joint_motion(joints: int, limited: bool) -> Kernel:
     kernel = Kernel("joint_motion")
     angles = [kernel.variable(f"angles{i}", joints, "angles", i) for i in range(3)]
     steps = [kernel.parameter(f"step{i}", 1, "step", i) for i in range(2)]
-    kernel.cost("joint_acceleration", derivative(angles, steps))
+    kernel.cost(finger.JOINT_ACCELERATION, derivative(angles, steps))
     if limited:
         kernel.constrain(limits.WITHIN_SPEED, ca.vertcat(*[(angles[i + 1] - angles[i]) / steps[i] for i in range(2)]))
     return kernel
@@ -272,7 +272,7 @@ def joint_jerk(joints: int) -> Kernel:
     """
     kernel = Kernel("joint_jerk")
     angles = [kernel.variable(f"angles{i}", joints, "angles", i) for i in range(4)]
-    kernel.cost("joint_jerk", derivative(angles, [kernel.parameter(f"step{i}", 1, "step", i) for i in range(3)]))
+    kernel.cost(finger.JOINT_JERK, derivative(angles, [kernel.parameter(f"step{i}", 1, "step", i) for i in range(3)]))
     return kernel
 
 
@@ -286,6 +286,6 @@ def stay(joints: int) -> Kernel:
         kernel.variable("axes", 2 * joints),
     )
     wanted = [kernel.parameter(f"wanted_{n}", k) for n, k in (("base", 2), ("lengths", joints), ("axes", 2 * joints))]
-    kernel.cost("stay_design", ca.vertcat(base - wanted[0], lengths - wanted[1], axes - wanted[2]))
+    kernel.cost(finger.STAY_DESIGN, ca.vertcat(base - wanted[0], lengths - wanted[1], axes - wanted[2]))
     kernel.constrain(limits.ON_PALM, ca.sumsqr(base))
     return kernel

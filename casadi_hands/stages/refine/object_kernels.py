@@ -13,6 +13,7 @@ from casadi_hands.geometry.surface import path_between, smooth_surface
 from casadi_hands.motion import conjugate, derivative, multiply, rotation_matrix
 from casadi_hands.motion.pose import placed
 from casadi_hands.nlp import Constraint, Kernel
+from casadi_hands.terms import body, contact
 from casadi_hands.terms import constraints as limits
 
 # Gauss and Legendre's points and weights, for a step from 0 to 1.
@@ -96,7 +97,7 @@ def physics() -> Kernel:
         turned += weight * step * turning(quaternion, omega)
         spun += weight * step * angular(omega, s)
     (before, rate0), (after, rate1) = states
-    kernel.cost("object_acceleration", (rate1 - rate0) / step)
+    kernel.cost(body.KNOT_ACCELERATION, (rate1 - rate0) / step)
     off = (
         after[:3] - before[:3] - step * rate0[:3] - moved,
         2 * multiply(conjugate(turned), turns[1][0])[1:],
@@ -130,7 +131,7 @@ def disturbed(contacts: int) -> Kernel:
     to_object = rotation_matrix(conjugate(quaternion))
     push = ca.vertcat(ca.mtimes(to_object, force), ca.mtimes(to_object, torque))
     kernel.constrain(limits.DISTURBED_WRENCH, ca.vertcat(ca.sum2(forces), _torque(points, forces)) + push - total)
-    kernel.cost("force_regularisation", forces)
+    kernel.cost(body.DISTURBED_FORCE, forces)
     return kernel
 
 
@@ -155,7 +156,7 @@ def object_jerk() -> Kernel:
     """
     kernel = Kernel("object_jerk")
     rates = [kernel.variable(f"rate{i}", 6, "rate", i) for i in range(3)]
-    kernel.cost("object_jerk", derivative(rates, [kernel.parameter(f"step{i}", 1, "step", i) for i in range(2)]))
+    kernel.cost(body.OBJECT_JERK, derivative(rates, [kernel.parameter(f"step{i}", 1, "step", i) for i in range(2)]))
     return kernel
 
 
@@ -164,7 +165,7 @@ def force_change(contacts: int) -> Kernel:
     """Change of the contact forces from one knot to the next."""
     kernel = Kernel("force_change")
     before, after = (kernel.variable(f"force{i}", 3 * contacts, "force", i) for i in range(2))
-    kernel.cost("force_change", after - before)
+    kernel.cost(body.FORCE_CHANGE, after - before)
     return kernel
 
 
@@ -173,7 +174,7 @@ def stay_on_path() -> Kernel:
     """The object near the motion of the whole-hand stage at one knot."""
     kernel = Kernel("stay_path")
     pose, wanted = kernel.variable("pose", 6), kernel.parameter("wanted_pose", 6)
-    kernel.cost("stay_path", pose - wanted)
+    kernel.cost(body.STAY_PATH, pose - wanted)
     return kernel
 
 
@@ -182,7 +183,7 @@ def meet_goal() -> Kernel:
     """The object's distance (6,) from a goal; the tolerance is there for where it is needed, not to be used up."""
     kernel = Kernel("meet_goal")
     pose, wanted = kernel.variable("pose", 6), kernel.parameter("goal_pose", 6)
-    kernel.cost("goal", pose - wanted)
+    kernel.cost(body.GOAL, pose - wanted)
     return kernel
 
 
@@ -207,8 +208,8 @@ def ground_contact() -> Kernel:
     kernel.constrain(limits.OPPOSED, outward[:2])
     kernel.constrain(limits.FACING, outward[2])
     _hold(kernel, exerted, friction, (limits.GROUND_PRESSING, limits.GROUND_CONE))
-    kernel.cost("stay_point", point - wanted_point)
-    kernel.cost("stay_force", force - wanted_force)
+    kernel.cost(contact.STAY_POINT, point - wanted_point)
+    kernel.cost(contact.STAY_FORCE, force - wanted_force)
     return kernel
 
 
@@ -249,7 +250,7 @@ def ground_rolling() -> Kernel:
         world.append(position + ca.mtimes(rotations[-1], point))
     slip = (path_between(points, normals, rotations) - world[1] + world[0])[:2]
     kernel.constrain(limits.GROUND_NO_SLIP, slip)
-    kernel.cost("slip", slip / step)
+    kernel.cost(contact.SLIP, slip / step)
     return kernel
 
 
@@ -291,5 +292,5 @@ def tool_point() -> Kernel:
     position, quaternion = placed(pose, reference)
     off = position + ca.mtimes(rotation_matrix(quaternion), tool) - target
     kernel.constrain(limits.ON_PATH, off)
-    kernel.cost("goal", off)
+    kernel.cost(body.GOAL, off)
     return kernel

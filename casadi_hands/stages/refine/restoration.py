@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from casadi_hands.nlp import Kernel, Parameter, Problem, Rows
 from casadi_hands.nlp.layout import Label
+from casadi_hands.terms.finger import PROXIMITY
 
 FORCE_SHARE = 0.1  # half extents that are as far to go as a force of one weight
 
@@ -49,5 +50,5 @@ class Proximity:
 def _near(share: float) -> Kernel:
     """One variable near to where it begins; with a larger share the same change costs more."""
     kernel = Kernel("anchor")
-    kernel.cost("anchor", share * (kernel.variable("value", 1) - kernel.parameter("near")))
+    kernel.cost(PROXIMITY, share * (kernel.variable("value", 1) - kernel.parameter("near")))
     return kernel

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from casadi_hands.nlp import Options
+from casadi_hands.terms.catalogue import single, terms_of
 
 _NEAR = (("nlp_scaling_method", "none"), ("bound_push", 1e-6), ("bound_frac", 1e-6))
 _MOST = 1e7  # of a multiplier; a regular one was seen to reach a tenth of that
@@ -30,24 +31,7 @@ PROJECTION = replace(NEARBY, max_iter=60)
 ACCEPTED = 1e-7  # largest violation with which a refined motion is handed on
 HOPELESS = 0.1  # half extents of slip: where firm solves leave more, rolling is out of the structure's reach
 FALLING = 0.5  # of the soft solve's slip: where the firm one leaves more than hopeless, but less than this, it goes on
-WEIGHTS = {
-    "slip": 3.0,
-    "passive_force": 3.0,
-    "spin": 0.1,
-    "stay_point": 1.0,
-    "stay_force": 0.02,
-    "friction_margin": 0.02,
-    "force_change": 0.5,
-    "joint_acceleration": 1e-3,
-    "joint_jerk": 3e-3,
-    "object_acceleration": 1e-2,
-    "object_jerk": 1e-3,
-    "stay_design": 5.0,  # or fingers grow long and turn elsewhere for next to nothing
-    "stay_path": 1.0,
-    "goal": 300.0,
-    "force_regularisation": 1e-3,
-    "anchor": 0.0,  # but in projections
-}
+WEIGHTS = {term.name: single(term.weights["refine"].default) for term in terms_of("refine")}
 FIRM = {"slip": 100.0, "passive_force": 30.0}
 FIRMER = FIRM | {"slip": 1000.0}
 EXACT = {"slip": 100.0}  # its tolerance is there for where it is needed

@@ -35,10 +35,10 @@ def follow(joints: int) -> Kernel:
     )
     point, _ = tip_point(tip, symbols.lengths[-1], radius)
     placed = symbols.placed(angles, radius, point)
-    kernel.cost("tip_target", active * (placed.contact - target))
-    kernel.cost("null_space", active * finger.null_space(placed.jacobian, force), "sum")
-    kernel.cost("torque", active * finger.joint_torques(placed.jacobian, force))
-    kernel.cost("joint_limits", finger.beyond_limits(angles, lowest, highest), "sum")
+    kernel.cost(finger.TIP_TARGET, active * (placed.contact - target))
+    kernel.cost(finger.NULL_SPACE, active * finger.null_space(placed.jacobian, force))
+    kernel.cost(finger.TORQUE, active * finger.joint_torques(placed.jacobian, force))
+    kernel.cost(finger.JOINT_LIMITS, finger.beyond_limits(angles, lowest, highest))
     return kernel
 
 
@@ -50,9 +50,9 @@ def build(joints: int) -> Kernel:
     palm_radius, radius, shortest, longest = (
         kernel.parameter(n) for n in ("palm_radius", "link_radius", "shortest", "longest")
     )
-    kernel.cost("length", lengths)
-    kernel.cost("minimum_length", finger.beyond_limits(lengths, shortest, longest), "sum")
-    kernel.cost("finger_base", finger.off_palm(base, palm_radius - radius), "sum")
+    kernel.cost(finger.LENGTH, lengths)
+    kernel.cost(finger.MINIMUM_LENGTH, finger.beyond_limits(lengths, shortest, longest))
+    kernel.cost(finger.FINGER_BASE, finger.off_palm(base, palm_radius - radius))
     return kernel
 
 
@@ -75,7 +75,7 @@ def collide(joints: int, primitives: int) -> Kernel:
     if joints > 1:
         apart.append(clearance.links_and_object(ends[:-1], radius, shapes))
     touching = clearance.links_and_object(ends[-1:], radius, shapes)
-    kernel.cost("collision", clearance.overlap(ca.vertcat(margin - ca.vertcat(*apart), -touching)), "sum")
+    kernel.cost(clearance.COLLISION, clearance.overlap(ca.vertcat(margin - ca.vertcat(*apart), -touching)))
     return kernel
 
 
@@ -92,7 +92,7 @@ def keep_apart(joints: int, other_joints: int) -> Kernel:
     radius, margin = kernel.parameter("link_radius"), kernel.parameter("margin")
     ends = first.placed(angles, radius).ends, second.placed(other_angles, radius).ends
     distances = clearance.links_and_links(*ends, radius)
-    kernel.cost("collision", clearance.overlap(margin - distances), "sum")
+    kernel.cost(clearance.COLLISION, clearance.overlap(margin - distances))
     return kernel
 
 
@@ -107,5 +107,5 @@ def travel(joints: int) -> Kernel:
         symbols.placed(kernel.variable(f"angles{i}", joints, "angles", i), ca.SX(0)).tip for i in range(3)
     )
     acceleration = finger.tip_acceleration(before, now, after, kernel.parameter("idle_step"))
-    kernel.cost("fingertip_acceleration", acceleration)
+    kernel.cost(finger.FINGERTIP_ACCELERATION, acceleration)
     return kernel

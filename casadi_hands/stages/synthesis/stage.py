@@ -205,13 +205,12 @@ class SynthesisStage:
         return self.target.scene(self.target.collision_times(BETWEEN))
 
     def _weights(self, weights: Mapping[str, object], step: int) -> dict[str, float]:
-        samples = {"collision": len(self.target.collision_times(BETWEEN))}
-        once = {"length", "minimum_length", "finger_base"}
+        counts = {"once": 1, "sample": len(self.target.collision_times(BETWEEN)), "keyframe": len(self.target.times)}
         values = {}
-        for term in self.problem.terms:
-            weight = weights[term]
+        for name, term in self.problem.declared_terms.items():
+            weight = weights[name]
             weight = float(weight[step] if isinstance(weight, tuple | list) else weight)  # type: ignore[arg-type]
-            values[f"weight.{term}"] = weight / (1 if term in once else samples.get(term, len(self.target.times)))
+            values[f"weight.{name}"] = weight / counts[term.weights["synthesis"].per]
         return values
 
     def _finger(self, solution: Solution, index: int, seed: FingerSeed) -> FingerSeed:

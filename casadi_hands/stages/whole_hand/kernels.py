@@ -44,15 +44,15 @@ def touch(joints: int, moves: bool) -> Kernel:
     here = symbols.placed(angles, radius, on_link)
     projection, normal, _ = project_to_capsule(on_link, SX.zeros(3, 1), ca.vertcat(0, 0, symbols.lengths[-1]), radius)
     force_in_palm = palm.turned(ca.mtimes(rotation, force))
-    kernel.cost("contact_on_finger", contact.off_surface(force, activity, on_link, projection), "sum")
+    kernel.cost(contact.CONTACT_ON_FINGER, contact.off_surface(force, activity, on_link, projection))
     position_before, quaternion_before = placed(pose_before, reference)
     object_moved = in_palm - palm_before.sees(position_before + ca.mtimes(rotation_matrix(quaternion_before), point))
     finger_moved = in_palm - symbols.placed(angles_before, radius, on_link).contact
-    kernel.cost("slip_on_finger", contact.slip(force, activity, object_moved, finger_moved, step))
+    kernel.cost(contact.SLIP_ON_FINGER, contact.slip(force, activity, object_moved, finger_moved, step))
     cone = contact.friction_cone(force_in_palm, ca.mtimes(here.tip_rotation, normal), friction, sharpness)
-    kernel.cost("friction_cone_hand", activity * cone, "sum")
-    kernel.cost("null_space", activity * finger.null_space(here.jacobian, force_in_palm), "sum")
-    kernel.cost("torque", activity * finger.joint_torques(here.jacobian, force_in_palm))
+    kernel.cost(contact.FRICTION_CONE_HAND, activity * cone)
+    kernel.cost(finger.NULL_SPACE, activity * finger.null_space(here.jacobian, force_in_palm))
+    kernel.cost(finger.TORQUE, activity * finger.joint_torques(here.jacobian, force_in_palm))
     return kernel
 
 
@@ -64,8 +64,9 @@ def move(joints: int) -> Kernel:
     symbols = given_morphology(kernel, joints)
     lowest, highest, step = kernel.parameter("lowest"), kernel.parameter("highest"), kernel.parameter("step")
     before, now, after = (symbols.placed(a, SX(0)).tip for a in angles)  # wherever it stands
-    kernel.cost("finger_acceleration", finger.tip_acceleration(before, now, after, step))
-    kernel.cost("joint_limits", ca.vertcat(ca.fmax(angles[1] - highest, 0), ca.fmax(lowest - angles[1], 0)))
+    kernel.cost(finger.FINGER_ACCELERATION, finger.tip_acceleration(before, now, after, step))
+    beyond = ca.vertcat(ca.fmax(angles[1] - highest, 0), ca.fmax(lowest - angles[1], 0))
+    kernel.cost(finger.JOINT_LIMITS_SQUARED, beyond)
     return kernel
 
 
@@ -93,7 +94,7 @@ def object_clearance(joints: int, primitives: int, moves: bool) -> Kernel:
     here = symbols.placed(angles, radius)
     up = palm.turned(SX([0, 0, 1]))
     apart, touching = distances(here, radius, palm_radius, in_palm, up, ground - palm.position[2])
-    kernel.cost("collision", clearance.overlap(ca.vertcat(margin - apart, -touching)), "sum")
+    kernel.cost(clearance.COLLISION, clearance.overlap(ca.vertcat(margin - apart, -touching)))
     return kernel
 
 
@@ -124,7 +125,7 @@ def finger_clearance(joints: int, other_joints: int) -> Kernel:
     apart = clearance.links_and_links(
         first.placed(angles, radius).ends, second.placed(other_angles, radius).ends, radius
     )
-    kernel.cost("collision", clearance.overlap(margin - apart), "sum")
+    kernel.cost(clearance.COLLISION, clearance.overlap(margin - apart))
     return kernel
 
 
@@ -134,5 +135,5 @@ def palm_motion() -> Kernel:
     kernel = Kernel("palm_motion")
     before, now, after = (kernel.variable(f"palm{i}", 6, "palm", i) for i in range(3))
     step = kernel.parameter("keyframe_step")
-    kernel.cost("base_acceleration", ca.vertcat((after - 2 * now + before) / step**2, 0.1 * now))
+    kernel.cost(finger.BASE_ACCELERATION, ca.vertcat((after - 2 * now + before) / step**2, 0.1 * now))
     return kernel
