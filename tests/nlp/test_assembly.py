@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from casadi import DM, MX, Function
 
-from casadi_hands.nlp import Kernel, Problem, Rows
+from casadi_hands.nlp import Constraint, Kernel, Parameter, Problem, Rows, Term
 
 RANDOM = np.random.default_rng(4)
 
@@ -17,10 +17,10 @@ def spring() -> Kernel:
     kernel = Kernel("spring")
     a, b = kernel.variable("a", 2), kernel.variable("b", 3)
     own, shared = kernel.parameter("own", 2), kernel.parameter("shared")
-    kernel.cost("stretch", ca.vertcat(ca.sin(a[0]) * b[2] - own[0], a[1] * b[0] * shared))
-    kernel.cost("bump", ca.exp(ca.dot(a, own)) + b[1] ** 2, "sum")
-    kernel.constrain("circle", ca.vertcat(ca.sumsqr(a) * b[0], b[1]))
-    kernel.constrain("product", a[0] * b[2] * own[1])
+    kernel.cost(Term("stretch"), ca.vertcat(ca.sin(a[0]) * b[2] - own[0], a[1] * b[0] * shared))
+    kernel.cost(Term("bump", form="sum"), ca.exp(ca.dot(a, own)) + b[1] ** 2)
+    kernel.constrain(Constraint("circle"), ca.vertcat(ca.sumsqr(a) * b[0], b[1]))
+    kernel.constrain(Constraint("product"), a[0] * b[2] * own[1])
     return kernel
 
 
@@ -28,8 +28,8 @@ def pull() -> Kernel:
     """Shares the term ``stretch``; no constraints, no parameters."""
     kernel = Kernel("pull")
     b = kernel.variable("b", 3)
-    kernel.cost("stretch", ca.cos(b[0]) * b[1])
-    kernel.cost("far", b[2] ** 2 * b[0], "sum")
+    kernel.cost(Term("stretch"), ca.cos(b[0]) * b[1])
+    kernel.cost(Term("far", form="sum"), b[2] ** 2 * b[0])
     return kernel
 
 
@@ -37,15 +37,15 @@ def only_bounds() -> Kernel:
     """A constraint and no cost."""
     kernel = Kernel("only_bounds")
     a = kernel.variable("a", 2)
-    kernel.constrain("hyperbola", a[0] * a[1])
+    kernel.constrain(Constraint("hyperbola"), a[0] * a[1])
     return kernel
 
 
 def cross() -> Kernel:
     """Two variables that may read the same."""
     kernel = Kernel("cross")
-    a, b = kernel.variable("a", 2), kernel.variable("b", 2)
-    kernel.cost("cross", ca.sin(a[0]) * b[0] + a[1] ** 2 * b[1] + a[0] * b[1], "sum")
+    a, b = kernel.variable("a", 2), kernel.variable("b", 2, "a")
+    kernel.cost(Term("cross", form="sum"), ca.sin(a[0]) * b[0] + a[1] ** 2 * b[1] + a[0] * b[1])
     return kernel
 
 
@@ -54,23 +54,27 @@ class Example:
 
     def __init__(self) -> None:
         self.problem = problem = Problem()
-        first = problem.variable("first", (4, 2))
-        second = problem.variable("second", (3, 3), -1, 1)
+        first = problem.variable("first", (4, 2), quantity="a")
+        second = problem.variable("second", (3, 3), -1, 1, quantity="b")
         own = problem.parameter("own", (5, 2))
         shared = problem.parameter("shared", (1, 1))
         self.mixing = [RANDOM.normal(size=(5, 4)), RANDOM.normal(size=(5, 3))]
         self.bindings: list[tuple[Kernel, list[np.ndarray], list[np.ndarray]]] = []
-        self._bind(spring(), [first.combine(self.mixing[0]), second.combine(self.mixing[1])], [own, shared])
-        self._bind(pull(), [second.take([0, 2, 2, 1])], [])
+        mixed = first.combine(self.mixing[0])
+        # By name, so in any order.
+        self._bind(spring(), {"b": second.combine(self.mixing[1]), "a": mixed}, {"shared": shared, "own": own})
+        self._bind(pull(), {"b": second.take([0, 2, 2, 1])})
         # The same expressions as another kernel's, twice; and the same variables.
-        self._bind(cross(), 2 * [first.combine(self.mixing[0])], [])
-        self._bind(cross(), 2 * [first], [])
-        self._bind(only_bounds(), [first.combine(np.abs(self.mixing[0]))], [])
+        self._bind(cross(), {"a": mixed, "b": mixed})
+        self._bind(cross(), {"a": first, "b": first})
+        self._bind(only_bounds(), {"a": first.combine(np.abs(self.mixing[0]))})
 
-    def _bind(self, kernel: Kernel, rows: list[Rows], parameters: list[np.ndarray]) -> None:
-        width = sum(g.numel() for g in kernel.constraints.values())
+    def _bind(self, kernel: Kernel, read: dict[str, Rows], given: dict[str, Parameter] | None = None) -> None:
+        width, given = sum(g.numel() for g in kernel.constraints.values()), given or {}
         bounds = {name: (-np.inf, np.arange(g.numel()) + 0.5) for name, g in kernel.constraints.items()}
-        self.problem.bind(kernel, rows, parameters, bounds)
+        self.problem.bind(kernel, bounds, **given, **read)
+        rows = [read[local.name] for local in kernel.local_variables]
+        parameters = [given[local.name].positions for local in kernel.local_parameters]
         size = self.problem.variables.size
         dense = [np.zeros((r.count, r.width, size)) for r in rows]
         for full, r in zip(dense, rows, strict=True):
@@ -160,58 +164,61 @@ def test_bounds_of_constraints_follow_their_rows(example: Example) -> None:
 
 def test_a_single_number_is_a_column_too() -> None:
     problem, kernel = Problem(), Kernel("one")
-    both = problem.variable("both", (2, 1))
+    both = problem.variable("both", (2, 1), quantity="y")
     y = kernel.variable("y", 1)
-    kernel.cost("distance", y - 1)
-    kernel.constrain("above", y)
-    problem.bind(kernel, [both.combine([[1, 1]])], bounds={"above": (0, np.inf)})
+    kernel.cost(Term("distance"), y - 1)
+    kernel.constrain(Constraint("above"), y)
+    problem.bind(kernel, {"above": (0, np.inf)}, y=both.combine([[1, 1]]))
     functions, x = problem.functions(), [0.5, 2.0]
     np.testing.assert_allclose(np.asarray(functions["grad_f"](x, 1.0)[1]).reshape(-1), [3, 3])
     np.testing.assert_allclose(np.asarray(functions["jac_g"](x, 1.0)[1]), [[1, 1]])
     np.testing.assert_allclose(np.asarray(functions["hess_lag"](x, 1.0, 1.0, 0.0)), [[2, 2], [0, 2]])
 
 
-def test_a_kernel_bound_to_wrong_rows_is_refused() -> None:
+def test_a_kernel_that_is_refused_leaves_nothing_behind() -> None:
     problem = Problem()
-    narrow = problem.variable("narrow", (4, 1))
-    with pytest.raises(ValueError, match=r"pull\.b: rows \(4, 1\), expected \(4, 3\)"):
-        problem.bind(pull(), [narrow])
-    wide = problem.variable("wide", (4, 2))
-    three = problem.variable("three", (4, 3))
-    with pytest.raises(ValueError, match=r"spring: 1 given, expected a, b"):
-        problem.bind(spring(), [wide])
-    own, shared = problem.parameter("own", (4, 2)), problem.parameter("shared", (1, 1))
-    with pytest.raises(ValueError, match="spring: 1 given, expected own, shared"):
-        problem.bind(spring(), [wide, three], [own])
-    with pytest.raises(ValueError, match="pull: 1 given, expected none"):
-        problem.bind(pull(), [three], [own])
-    # Three in all, as asked, but not one by one.
-    with pytest.raises(ValueError, match=r"spring\.own: rows \(1, 1\), expected \(4, 2\)"):
-        problem.bind(spring(), [wide, three], [shared, own])
+    a, b = problem.variable("a", (4, 2)), problem.variable("b", (4, 3))
+    own, shared = problem.parameter("own", (3, 2)), problem.parameter("shared", (1, 1))
     with pytest.raises(ValueError, match=r"spring\.own: rows \(3, 2\), expected \(4, 2\)"):
-        problem.bind(spring(), [wide, three], [own[:3], shared])
-    # Nothing of what was refused is left behind.
+        problem.bind(spring(), {"circle": (0, 1), "product": (0, 1)}, a=a, b=b, own=own, shared=shared)
     assert problem.constraints.size == 0
     assert problem.terms == []
+
+
+def test_an_argument_may_be_named_as_what_bind_itself_is_given() -> None:
+    problem, kernel = Problem(), Kernel("names")
+    symbols = [kernel.variable(name, 1) for name in ("kernel", "bounds", "block", "self")]
+    kernel.constrain(Constraint("sum"), sum(symbols, ca.SX(0)))
+    rows = {name: problem.variable(name, (2, 1)) for name in kernel.locals}
+    problem.bind(kernel, {"sum": (0.0, 1.0)}, "frame", **rows)
+    assert list(problem.constraint_rows) == ["frame.sum"]
 
 
 def test_a_kernel_names_nothing_twice() -> None:
     kernel = Kernel("twice")
     x = kernel.variable("x", 1)
-    kernel.cost("once", x)
+    kernel.cost(Term("once"), x)
     with pytest.raises(KeyError, match="kernel 'twice' already has a term 'once'"):
-        kernel.cost("once", ca.SX(0))
-    kernel.constrain("positive", x)
+        kernel.cost(Term("once"), ca.SX(0))
+    kernel.constrain(Constraint("positive"), x)
     with pytest.raises(KeyError, match="kernel 'twice' already has a constraint 'positive'"):
-        kernel.constrain("positive", -x)
+        kernel.constrain(Constraint("positive"), -x)
     assert kernel.constraints["positive"] is x
 
 
-def test_a_kernel_s_symbols_keep_their_names_and_sizes() -> None:
+def test_a_kernel_s_symbols_keep_what_they_are() -> None:
     kernel = Kernel("names")
-    kernel.variable("of_one", 1)
-    kernel.variable("of_two", 2)
+    kernel.variable("pose_before", 6, "pose", -1)
     kernel.parameter("palm_radius")
+    kernel.variable("pose", 6, place=0)
     kernel.parameter("inertia", 9)
-    assert kernel.variable_sizes == [("of_one", 1), ("of_two", 2)]
-    assert kernel.parameter_sizes == [("palm_radius", 1), ("inertia", 9)]
+    locals_of = [
+        [(s.name, s.size, s.quantity, s.place) for s in which]
+        for which in (kernel.local_variables, kernel.local_parameters)
+    ]
+    assert locals_of[0] == [("pose_before", 6, "pose", -1), ("pose", 6, "pose", 0)]
+    assert locals_of[1] == [("palm_radius", 1, "palm_radius", None), ("inertia", 9, "inertia", None)]
+    assert list(kernel.locals) == ["pose_before", "palm_radius", "pose", "inertia"]
+    for declare in (kernel.variable, kernel.parameter):
+        with pytest.raises(KeyError, match="kernel 'names' already has a symbol 'inertia'"):
+            declare("inertia", 9)

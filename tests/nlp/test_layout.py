@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from casadi_hands.nlp import Layout, Rows
+from casadi_hands.nlp import Layout, Parameter, Problem, Rows
+from casadi_hands.nlp.layout import Label
 
 RANDOM = np.random.default_rng(0)
 
@@ -95,3 +96,62 @@ def test_offsets_go_along_with_the_rows_they_are_added_to() -> None:
     np.testing.assert_allclose(values(rows.entries(1, 2)), expected[:, 1:])
     np.testing.assert_allclose(values(Rows.beside([rows, rows.entries(0, 1)])), np.hstack([expected, expected[:, :1]]))
     np.testing.assert_allclose(values(rows.constant(2)), expected[[0, 0]])
+
+
+# What rows and parameters are.
+
+
+def test_rows_keep_what_they_are_and_tell_when() -> None:
+    label = Label("pose", owner=3)
+    rows = Rows.of(np.arange(12).reshape(4, 3), 12, label)
+    assert rows.label == label
+    for same in (rows.plus(np.ones((4, 3))), rows.entries(1, 2), rows.combine(np.eye(4))):
+        assert same.label == label
+    # The mark grows with what is taken, and with the offset that a combination is said to have.
+    assert rows.take([1, 2]).label == Label("pose", 3, 1.5)
+    assert rows.take([2, 2]).entries(0, 1).plus(np.ones((2, 1))).label == Label("pose", 3, 2.0)
+    assert rows.take([1, 2]).combine(np.eye(2), when=-1).label == Label("pose", 3, -1)
+    assert rows.take([]).label == label
+    # A single row is what it is at all times.
+    single = Rows.of(np.arange(3)[None], 12, Label("base", 3))
+    assert single.constant(4).label == single.take([0, 0]).label == Label("base", 3)
+    assert Rows.beside([rows.take([0, 1]), rows.take([2, 3])]).label == Label("pose", 3, 0.5)
+    assert Rows.of(np.arange(3)[None], 12).label == Label()
+
+
+def test_parameters_read_take_and_split() -> None:
+    positions, label = RANDOM.permutation(12).reshape(4, 3), Label("target", owner=1)
+    target = Parameter(positions, label)
+    assert target.shape == (4, 3)
+    for taken, expected, mark in (
+        (target.take([2, 2, 0]), positions[[2, 2, 0]], Label("target", 1, 4 / 3)),
+        (target.take([]), positions[:0], label),
+        (target.row(2), positions[[2]], label),
+        (target.entries(1, 3), positions[:, 1:3], label),
+        (target.take([1, 3]).entries(0, 1), positions[[1, 3], :1], Label("target", 1, 2.0)),
+    ):
+        np.testing.assert_array_equal(taken.positions, expected)
+        assert taken.label == mark
+
+
+def test_a_parameter_that_all_instances_share_is_taken_whole() -> None:
+    shared = Parameter(np.array([[4, 5]]), Label("reference"))
+    for taken in (shared.take([3, 7]), shared.take([])):
+        np.testing.assert_array_equal(taken.positions, [[4, 5]])
+        assert taken.label == Label("reference")
+
+
+def test_a_problem_labels_what_it_declares_and_finds_parameters_again() -> None:
+    problem = Problem()
+    assert problem.variable("force_disturbed", (2, 3), quantity="force").label == Label("force")
+    assert problem.variable("angles1", (2, 3), quantity="angles", owner=1).label == Label("angles", 1)
+    assert problem.variable("pose", (2, 6)).label == Label("pose")
+    friction, step = problem.parameter("friction", (1, 1)), problem.parameter("step", (2, 1))
+    before = problem.parameter("palm_before", (2, 3), quantity="palm", owner=2, when=-1)
+    assert (friction.label, before.label) == (Label("friction"), Label("palm", 2, -1))
+    np.testing.assert_array_equal(before.positions, problem.parameters["palm_before"])
+    assert problem["step"] is step
+    assert problem.given("step", "friction") == {"step": step, "friction": friction}
+    for find in (problem.given, problem.__getitem__):
+        with pytest.raises(KeyError, match="stpe"):
+            find("stpe")

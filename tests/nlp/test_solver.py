@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.optimize import NonlinearConstraint, minimize
 
-from casadi_hands.nlp import Kernel, Options, Problem, Solution, Solver
+from casadi_hands.nlp import Constraint, Kernel, Options, Problem, Solution, Solver, Term
 
 EXACT = Options(max_iter=200, tol=1e-10, acceptable_tol=1e-10, constr_viol_tol=1e-10)
 TARGETS = np.array([[0.2, 1.4], [-0.3, 0.8], [1.5, 0.1]])
@@ -21,15 +21,15 @@ WEIGHTS = {"weight.near": 2.0, "weight.smooth": 0.7}
 def chain() -> Problem:
     """Three points near targets, smooth, each outside a circle and within a box."""
     problem = Problem()
-    points = problem.variable("points", (3, 2), -1.0, [[1.1, 2.0]])
+    points = problem.variable("points", (3, 2), -1.0, [[1.1, 2.0]], quantity="x")
     near, smooth, outside = Kernel("near"), Kernel("smooth"), Kernel("outside")
-    near.cost("near", near.variable("x", 2) - near.parameter("target", 2))
-    problem.bind(near, [points], [problem.parameter("targets", (3, 2))])
-    before, after = smooth.variable("a", 2), smooth.variable("b", 2)
-    smooth.cost("smooth", (after - before) ** 2, "sum")
-    problem.bind(smooth, [points.take([0, 1]), points.take([1, 2])])
-    outside.constrain("radius", ca.sumsqr(outside.variable("x", 2)))
-    problem.bind(outside, [points], [], {"radius": (1.0, np.inf)})
+    near.cost(Term("near"), near.variable("x", 2) - near.parameter("target", 2))
+    problem.bind(near, x=points, target=problem.parameter("targets", (3, 2), quantity="target"))
+    before, after = (smooth.variable(f"x{i}", 2, "x", i) for i in range(2))
+    smooth.cost(Term("smooth", form="sum"), (after - before) ** 2)
+    problem.bind(smooth, x=(points.take([0, 1]), points.take([1, 2])))
+    outside.constrain(Constraint("radius"), ca.sumsqr(outside.variable("x", 2)))
+    problem.bind(outside, {"radius": (1.0, np.inf)}, x=points)
     return problem
 
 
@@ -150,9 +150,9 @@ def test_numbers_are_those_of_the_point_returned_where_ipopt_evaluates_nothing()
     x = problem.variable("x", (1, 1))
     kernel = Kernel("two")
     local = kernel.variable("x", 1)
-    kernel.cost("square", local)
-    kernel.constrain("equations", ca.vertcat(local, local**2 + 1))
-    problem.bind(kernel, [x], [], {"equations": (2.0, 2.0)})
+    kernel.cost(Term("square"), local)
+    kernel.constrain(Constraint("equations"), ca.vertcat(local, local**2 + 1))
+    problem.bind(kernel, {"equations": (2.0, 2.0)}, x=x)
     stopped = Solver(problem).solve({"x": 1.5}, {"weight.square": 1.0})
     assert stopped.status == "Not_Enough_Degrees_Of_Freedom"
     assert stopped.values["x"].tolist() == [[1.5]]
@@ -166,8 +166,8 @@ def test_a_constraint_that_is_no_number_is_violated_without_bound() -> None:
     problem = Problem()
     x = problem.variable("x", (2, 1))
     kernel = Kernel("root")
-    kernel.constrain("root", ca.sqrt(kernel.variable("x", 1)))
-    problem.bind(kernel, [x], [], {"root": (-np.inf, np.inf)})
+    kernel.constrain(Constraint("root"), ca.sqrt(kernel.variable("x", 1)))
+    problem.bind(kernel, {"root": (-np.inf, np.inf)}, x=x)
     stopped = Solver(problem).solve({"x": [[-1.0], [4.0]]}, {})
     assert stopped.violation == stopped.violations["root.root"] == np.inf
     assert stopped.constraints["root.root"][1, 0] == 2.0
@@ -226,11 +226,11 @@ def test_a_kernel_without_instances_changes_nothing_and_its_constraints_have_no_
     x = problem.variable("x", (3, 2), -1, 1)
     kernel, idle = Kernel("near"), Kernel("idle")
     for one in (kernel, idle):
-        a = one.variable("a", 2)
-        one.cost(f"from_{one.name}", a - 0.5)
-        one.constrain("sum", ca.sum1(a))
-    problem.bind(kernel, [x], [], {"sum": (-np.inf, 0.8)})
-    problem.bind(idle, [x.take([])], [], {"sum": (-np.inf, 0.0)})
+        a = one.variable("x", 2)
+        one.cost(Term(f"from_{one.name}"), a - 0.5)
+        one.constrain(Constraint("sum"), ca.sum1(a))
+    problem.bind(kernel, {"sum": (-np.inf, 0.8)}, x=x)
+    problem.bind(idle, {"sum": (-np.inf, 0.0)}, x=x.take([]))
     solution = Solver(problem).solve({}, {"weight.from_near": 1.0}, constraints={"idle.sum": (0.0, 0.0)})
     np.testing.assert_allclose(solution.values["x"], 0.4, atol=1e-4)
     assert list(solution.terms) == ["from_near"]
@@ -242,10 +242,10 @@ def test_a_solve_starts_no_threads() -> None:
     # In a process of its own, where nothing has loaded the solver's linear algebra, which may start a thread a core.
     script = (
         "import os, pinocchio, casadi as ca\n"
-        "from casadi_hands.nlp import Kernel, Problem, Solver\n"
+        "from casadi_hands.nlp import Kernel, Problem, Solver, Term\n"
         "problem = Problem(); x = problem.variable('x', (1, 2))\n"
-        "kernel = Kernel('k'); kernel.cost('near', kernel.variable('a', 2) - 1)\n"
-        "problem.bind(kernel, [x]); before = len(os.listdir('/proc/self/task'))\n"
+        "kernel = Kernel('k'); kernel.cost(Term('near'), kernel.variable('x', 2) - 1)\n"
+        "problem.bind(kernel, x=x); before = len(os.listdir('/proc/self/task'))\n"
         "assert 'OPENBLAS_NUM_THREADS' not in os.environ\n"
         "Solver(problem).solve({}, {'weight.near': 1.0})\n"
         "assert 'OPENBLAS_NUM_THREADS' not in os.environ\n"
