@@ -26,6 +26,7 @@ from isolated import Outcome, isolated
 from peers import Attempt, Build, Method, Posed, Run, by_scipy, opti, ours, recorded_solves
 from profiled import KINDS, cores_used, profiled_solve
 from shared import NOTHING, options_of, write_table
+from tables import add_json, write_record
 
 from casadi_hands import load_task
 from casadi_hands.kinematics.morphology import FingerSeed
@@ -65,6 +66,7 @@ PEERS = (
     "MB",
 )
 EVALUATED = ("task", "stage", *(f"{name}: ms, times its kernels in a loop" for name in FUNCTIONS), "all, as called")
+BUSY = ("task", "two processes ask for", "and get")
 MEDIANS = ("stage", "optimiser", "times slower to its own objective", "times slower in all", "tasks")
 SPENT = ("task", "stage", "s", "solves", "iterations", *(f"{kind} %" for kind in KINDS), "Python and files %")
 
@@ -90,10 +92,12 @@ def main() -> None:
     parser.add_argument("--profile", action=BooleanOptionalAction, default=True, help="profile whole solves")
     parser.add_argument("--evaluation", action=BooleanOptionalAction, default=True, help="time functions alone")
     parser.add_argument("--out", type=Path, default=Path("results/benchmark"), help="folder for tables and chart")
+    add_json(parser)
     given = parser.parse_args()
     comparisons: list[list[str]] = []
     spent: list[list[str]] = []
     evaluated: list[list[str]] = []
+    busy: list[list[str]] = []
     for task in given.tasks:
         if given.peers:
             search = {"joints": given.joints, "trials": given.trials}
@@ -101,13 +105,19 @@ def main() -> None:
                 comparisons += compare(pose, task, given.limit)
                 write_table(PEERS, comparisons, given.out / "peers.md")
             write_table(MEDIANS, medians(comparisons), given.out / "medians.md")
+            write_record(given.json, "peers", *side_by_side(comparisons))
+            write_record(given.json, "medians", MEDIANS, medians(comparisons))
         if given.evaluation:
             evaluated += evaluations(task)
             write_table(EVALUATED, evaluated, given.out / "evaluation.md")
+            write_record(given.json, "evaluation", EVALUATED, evaluated)
         if given.profile:
             spent += spending(task)
             write_table(SPENT, spent, given.out / "profile.md")
-            print(two_processes(task))
+            busy.append([load_task(task).name, *two_processes(task)])
+            write_table(BUSY, busy, given.out / "busy.md")
+            write_record(given.json, "profile", SPENT, spent)
+            write_record(given.json, "busy", BUSY, busy)
     print(f"cold start: {cold_start(given.tasks[0])}")
 
 
@@ -203,6 +213,28 @@ def compared(ended: Outcome[Run], reference: Run, limit: float, same_problem: bo
     ]
 
 
+def side_by_side(rows: Sequence[Sequence[str]]) -> tuple[list[str], list[list[str]]]:
+    """Columns and rows of the table with a stage of a task in a line, from the rows of ``PEERS``.
+
+    A cell says how many times longer an optimiser takes than ours: to its own objective / in all; with ``>`` where a
+    solve was stopped at the limit.
+    """
+    named = [dict(zip(PEERS, row, strict=True)) for row in rows]
+    others = [name for name in METHODS if name not in (OURS, CONSTRAINED)]
+    lines: dict[tuple[str, str], dict[str, str]] = {}
+    for row in named:
+        if row["times slower in all"] == NOTHING:
+            cell = row["building s"]  # where the failure is told
+        elif row["optimiser"] == OURS:
+            cell = f"{float(row['building s']):.2f} + {float(row['solving s']):.2f}"
+        else:
+            stopped = "" if row["reached at the limit"].startswith("0 ") else "> "
+            cell = f"{row['times slower to its own objective']} / {stopped}{row['times slower in all']}"
+        lines.setdefault((row["task"], row["stage"]), {})[row["optimiser"]] = cell
+    head = ["task", "stage", "ours: building + solving s", *others]
+    return head, [[*key, *(cells.get(name, NOTHING) for name in (OURS, *others))] for key, cells in lines.items()]
+
+
 def medians(rows: Sequence[Sequence[str]]) -> list[list[str]]:
     """Over the tasks, of each optimiser in each stage, from the rows of ``PEERS``; what never ended is not counted.
 
@@ -281,13 +313,13 @@ def spending(task_file: Path) -> list[list[str]]:
     return [*rows, [name, text, start, *counts, *shares(kinds, profile["total"])]]
 
 
-def two_processes(task_file: Path) -> str:
-    """How busy two processes keep two cores in stage 2."""
+def two_processes(task_file: Path) -> tuple[str, str]:
+    """How busy two processes keep two cores in stage 2: what they ask for of these, and what they get."""
     used = isolated(cores_used, task_file, limit=3600)
     if used.value is None:
-        return f"{task_file}: two processes: {used.failure}"
+        return used.failure, NOTHING
     got, asked = (f"{100 * share:.0f} %" for share in used.value)
-    return f"{task_file}: in stage 2 two processes ask for {asked} of two cores and get {got}"
+    return asked, got
 
 
 def shares(seconds: dict[str, float], whole: float) -> list[str]:

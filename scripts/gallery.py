@@ -14,6 +14,7 @@ from pathlib import Path
 from cards import page
 from entries import REPLAYS, Entry, entry_of, figures_of
 from shared import NOTHING, kept_solve, options_of, table_text
+from tables import add_json, write_record
 
 PAGE = "gallery.html"
 HEAD = (
@@ -41,6 +42,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes of each solve")
     parser.add_argument("--limit", type=float, metavar="MINUTES", help="end a solve that takes longer")
     parser.add_argument("--no-solve", action="store_true", help="only show what has been solved")
+    add_json(parser)
     given = parser.parse_args()
     # In the thesis's order, then what is not from it.
     files = sorted(given.problems.glob("*.yaml"), key=lambda file: (figures_of(file) or ("~",), file.stem))
@@ -56,19 +58,30 @@ def main() -> None:
         kept_solve(file, seed, "refine", given.out, given.jobs, given.limit)
         entries[file, seed] = entry_of(file, seed, given.out, given.jobs)
         write_all(list(entries.values()), given.out)
+    write_record(given.json, "gallery", HEAD, rows_of(by_task(list(entries.values()))))
     print(given.out / PAGE)
 
 
 def write_all(entries: list[Entry], out: Path) -> None:
     """Write ``gallery.html`` and ``table.md``; a task's entries of all seeds share a card and have a row each."""
     out.mkdir(parents=True, exist_ok=True)
+    tasks = by_task(entries)
+    (out / "table.md").write_text(table_text(HEAD, rows_of(tasks)), encoding="utf-8")
+    cards = [sorted(seeds, key=lambda entry: entry.rank) for seeds in tasks]
+    (out / PAGE).write_text(page(cards, out), encoding="utf-8")
+
+
+def by_task(entries: list[Entry]) -> list[list[Entry]]:
+    """The entries of each task, of all seeds."""
     tasks: dict[Path, list[Entry]] = {}
     for entry in entries:
         tasks.setdefault(entry.file, []).append(entry)
-    rows = [row(entry) for seeds in tasks.values() for entry in seeds]
-    (out / "table.md").write_text(table_text(HEAD, rows), encoding="utf-8")
-    cards = [sorted(seeds, key=lambda entry: entry.rank) for seeds in tasks.values()]
-    (out / PAGE).write_text(page(cards, out), encoding="utf-8")
+    return list(tasks.values())
+
+
+def rows_of(tasks: list[list[Entry]]) -> list[list[str]]:
+    """The table's lines, those of a task together."""
+    return [row(entry) for seeds in tasks for entry in seeds]
 
 
 def row(entry: Entry) -> list[str]:

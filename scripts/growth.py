@@ -22,6 +22,7 @@ from unittest.mock import patch
 import numpy as np
 from isolated import isolated, largest_memory
 from shared import NOTHING, options_of, write_table
+from tables import add_json, write_record
 
 from casadi_hands.kinematics.morphology import FingerSeed
 from casadi_hands.nlp import Options, Solution, Solver
@@ -43,6 +44,7 @@ from casadi_hands.task import Task, parse_task
 ITERATIONS = 8
 STAGES = ("floating", "synthesis", "refine")
 HEAD = ("changed", "value", "stage", "variables", "building s", "ms an iteration", "MB")
+EXPONENTS = ("stage", "building", "an iteration")
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,7 @@ def main() -> None:
     parser.add_argument("--limit", type=float, default=300.0, help="s for each point")
     parser.add_argument("--out", type=Path, default=Path("results/growth"), help="folder for the table")
     parser.add_argument("--plot", type=Path, help="also draw a chart to this file; needs matplotlib")
+    add_json(parser)
     given = parser.parse_args()
     rows: list[list[str]] = []
     measured: dict[tuple[str, str], dict[int, Point]] = {}
@@ -93,8 +96,10 @@ def main() -> None:
                 if outcome.value is not None:
                     measured.setdefault((sweep, stage), {})[value] = outcome.value
         write_table(HEAD, rows, given.out / "growth.md")
-    for line in exponents(measured):
-        print(line)
+    write_record(given.json, "growth", *by_size(rows))
+    write_record(given.json, "growth_exponents", EXPONENTS, exponents(measured))
+    for stage, building, iterating in exponents(measured):
+        print(f"{stage}: building grows as keyframes^{building}, an iteration as keyframes^{iterating}")
     if given.plot:
         draw(measured, given.plot)
 
@@ -106,8 +111,29 @@ def cells(point: Point | None, failure: str) -> list[str]:
     return [f"{point.variables}", f"{point.building:.2f}", f"{1e3 * point.iteration:.1f}", f"{point.megabytes:.0f}"]
 
 
-def exponents(measured: dict[tuple[str, str], dict[int, Point]]) -> list[str]:
-    """In words: what power of the number of keyframes, from 11 on, building and iterating grow with."""
+def by_size(rows: Sequence[Sequence[str]]) -> tuple[list[str], list[list[str]]]:
+    """Columns and rows of the table with the stages side by side, from the rows of ``HEAD``."""
+    stages = list(dict.fromkeys(row[2] for row in rows))
+    cells: dict[tuple[str, str], dict[str, str]] = {}
+    memory: dict[tuple[str, str], list[float]] = {}
+    for changed, value, stage, _, building, iteration, megabytes in rows:
+        cells.setdefault((changed, value), {})[stage] = f"{building}, {iteration}"
+        if megabytes != NOTHING:
+            memory.setdefault((changed, value), []).append(float(megabytes))
+    head = ["changed", "to", *(f"{stage}: building s, ms an iteration" for stage in stages), "most memory MB"]
+    lines = [
+        [
+            *size,
+            *(each.get(stage, NOTHING) for stage in stages),
+            f"{max(memory[size]):.0f}" if size in memory else NOTHING,
+        ]
+        for size, each in cells.items()
+    ]
+    return head, lines
+
+
+def exponents(measured: dict[tuple[str, str], dict[int, Point]]) -> list[list[str]]:
+    """What power of the number of keyframes, from 11 on, each stage's building and iterating grow with."""
     lines = []
     for (sweep, stage), points in measured.items():
         long = {n: point for n, point in points.items() if n > 10}
@@ -117,7 +143,7 @@ def exponents(measured: dict[tuple[str, str], dict[int, Point]]) -> list[str]:
             exponent(list(long), [getattr(point, what) for point in long.values()])
             for what in ("building", "iteration")
         )
-        lines.append(f"{stage}: building grows as keyframes^{building:.2f}, an iteration as keyframes^{iterating:.2f}")
+        lines.append([stage, f"{building:.2f}", f"{iterating:.2f}"])
     return lines
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from shared import NOTHING, joints_of, kept_solve, options_of, replays_of, write_table
+from tables import add_json, write_record
 
 from casadi_hands import Design, audit
 from casadi_hands.errors import DesignError
@@ -48,6 +49,7 @@ def main() -> None:
     parser.add_argument("--replays", type=int, default=100, help="perturbed replays of each result")
     parser.add_argument("--out", type=Path, default=Path("results/measured"), help="folder for the results")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes")
+    add_json(parser)
     given = parser.parse_args()
     rows = []
     for task in given.tasks:
@@ -56,6 +58,7 @@ def main() -> None:
             replays = replays_of(folder, given.replays, given.jobs)
             rows.append(row(design, figures_of(folder), replays, seed))
             write_table(HEAD, rows, given.out / "table.md")
+            write_record(given.json, "measure", HEAD, rows)
 
 
 def figures_of(folder: Path) -> dict[str, Figure]:

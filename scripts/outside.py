@@ -1,6 +1,6 @@
 """Let other programs load and play solved designs, and print tables of what they say.
 
-    python scripts/outside.py results/gallery/* --out docs/outside.md
+    python scripts/outside.py results/gallery/* --json docs/benchmarks
 
 For every result folder with a scene: how far the object moves in two seconds of MuJoCo at the keyframe ``start`` with
 that keyframe's commands held; where ``examples/play.py`` ends against the replay; whether MuJoCo and Drake drop it,
@@ -20,6 +20,7 @@ import numpy as np
 from outside_models import disagreement
 from scipy.spatial.transform import Rotation
 from shared import options_of, table_text
+from tables import add_json, write_record
 
 from casadi_hands import Design
 from casadi_hands.verify import Replays, run_replays
@@ -36,6 +37,7 @@ def main() -> None:
     parser.add_argument("folders", metavar="DIR", nargs="+", type=Path, help="result folders")
     parser.add_argument("--out", type=Path, help="Markdown file for the tables")
     parser.add_argument("--jobs", type=int, default=1, help="processes for the replays")
+    add_json(parser)
     given = parser.parse_args()
     rows, engines, same = [], [], []
     for folder in given.folders:
@@ -55,6 +57,8 @@ def main() -> None:
         means = [f"{1e3 * p.nominal.position_mean:.2g} mm · {p.nominal.angle_mean:.2g}°" for p in played.values()]
         engines.append((design.task.name, *means, marks(first), marks(second), f"{sum(agree)}/{len(agree)}"))
         print(" | ".join((*rows[-1], *engines[-1][1:])), flush=True)
+    write_record(given.json, "outside", HEAD, rows)
+    write_record(given.json, "engines", ENGINES_HEAD, engines)
     share = 100 * np.mean(same)
     text = (
         f"{table_text(HEAD, rows)}\n{table_text(ENGINES_HEAD, engines)}\n"

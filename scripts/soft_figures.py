@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from apart import ended
 from shared import NOTHING, SEEDS, joints_of, kept_solve, options_of, write_table
+from tables import add_json, write_record
 
 from casadi_hands import Design
 from casadi_hands.errors import DesignError
@@ -46,6 +47,7 @@ def main() -> None:
     parser.add_argument("--seeds", nargs="+", type=int, default=list(SEEDS), help="seeds of the search")
     parser.add_argument("--out", type=Path, default=Path("results/measured"), help="folder for the results")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes")
+    add_json(parser)
     given = parser.parse_args()
     rows = []
     for task in given.tasks:
@@ -55,6 +57,7 @@ def main() -> None:
             ends = [NOTHING if seconds is None else f"{seconds:.0f}"]
             rows.append([design.task.name, str(seed), joints_of(design), *figures_of(design, path), *ends])
             write_table(HEAD, rows, given.out / "soft.md")
+            write_record(given.json, "soft_figures", HEAD, rows)
 
 
 def figures_of(design: Design, path: Path) -> list[str]:

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from entries import STATES, state_of
 from shared import joints_of, kept_solve, options_of, table_text
+from tables import add_json, write_record
 from vary import Change, write_variation
 
 from casadi_hands import Design, load_task
@@ -65,6 +66,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes of each solve")
     parser.add_argument("--limit", type=float, metavar="MINUTES", help="end a solve that takes longer")
     parser.add_argument("--no-solve", action="store_true", help="only write the task files")
+    add_json(parser)
     given = parser.parse_args()
     runs: list[Run] = []
     # All tasks once, then all again: a count that is cut short is of all tasks.
@@ -80,15 +82,20 @@ def main() -> None:
             text = report(runs)
             (given.out / "variation.md").write_text(text, encoding="utf-8")
             print(text, flush=True)
+            write_record(given.json, "variation", RATES, rates_of(runs))
 
 
 def report(runs: list[Run]) -> str:
     """How many variations are certified, by task and in all, and what became of each."""
     names = list(dict.fromkeys(run.name for run in runs))
-    rates = [_rate(name, [run for run in runs if run.name == name]) for name in names]
-    rates.append(_rate("all", runs))
     each = [_row(run) for run in sorted(runs, key=lambda run: (names.index(run.name), run.number))]
-    return f"{table_text(RATES, rates)}\n{table_text(RUNS, each)}"
+    return f"{table_text(RATES, rates_of(runs))}\n{table_text(RUNS, each)}"
+
+
+def rates_of(runs: list[Run]) -> list[list[str]]:
+    """How many variations of each task are certified, and of all."""
+    names = list(dict.fromkeys(run.name for run in runs))
+    return [*(_rate(name, [run for run in runs if run.name == name]) for name in names), _rate("all", runs)]
 
 
 def _rate(name: str, runs: list[Run]) -> list[str]:
