@@ -13,10 +13,12 @@ from casadi_hands.nlp import Constraint
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.si import build_model
 from casadi_hands.stages.refine.result import Refined, Run, Worst
+from casadi_hands.stages.refine.stage import RefineStage
 from casadi_hands.stages.refine.values import Margin
-from casadi_hands.terms import constraints as limits
 from casadi_hands.task import parse_task
+from casadi_hands.terms import constraints as limits
 from tests.stages.example import made_up_solution
+from tests.stages.refining import carrying, sketching
 from tests.stages.synthesis.example import BALL
 
 # Half an extent is 3 cm, the weight 0.1 · 9.81 N; samples are 0.1 s apart.
@@ -62,8 +64,18 @@ def test_slip_is_laid_to_the_finger_that_slips_most() -> None:
         (limits.ACTUATED, (0,), 0.25, "finger 'left' cannot supply its force with its joints at {}, by 0.25 weights"),
         (limits.ON_LINK, (1,), 0.1, "finger 'right' cannot reach its contact at {}, by 3 mm"),
         (limits.WITHIN_TORQUE, (1,), 2.0, f"within the torque limit at {{}}, by {2 * TORQUE_UNIT:.2g} N·m"),
-        (limits.WITHIN_SPEED, (0,), 1.5, "finger 'left' cannot keep within the joints' speed limit at {}, by 1.5 rad/s"),
-        (limits.CLEAR_OF_EACH_OTHER, (1, 0), 0.1, "fingers 'left' and 'right' cannot stay clear of each other at {}, by 3 mm"),
+        (
+            limits.WITHIN_SPEED,
+            (0,),
+            1.5,
+            "finger 'left' cannot keep within the joints' speed limit at {}, by 1.5 rad/s",
+        ),
+        (
+            limits.CLEAR_OF_EACH_OTHER,
+            (1, 0),
+            0.1,
+            "fingers 'left' and 'right' cannot stay clear of each other at {}, by 3 mm",
+        ),
         (limits.DEFECT, (), 0.1, "the object cannot be moved as planned by the forces of its contacts at {}"),
     ],
 )
@@ -93,18 +105,18 @@ def test_a_constraint_without_words_is_told_by_its_name() -> None:
 
 
 def test_every_constraint_of_the_stage_has_words() -> None:
-    from casadi_hands.stages.refine.stage import RefineStage
-    from tests.stages.refining import carrying, sketching
-
     task = parse_task(BALL + "actuator: {torque: 1, speed: 1}\n")
     model = build_model(task)
     active = np.ones((len(model.schedule.samples), 2), bool)
     active[3, 0] = False
-    stages = (RefineStage(model, (0, 1), (1, 2), active), carrying().stage, sketching().stage)
-    blocks = {name: block for stage in stages for name, block in stage.built.blocks.items()}
-    assert {"disturbed_ground", "tool_point", "joint_motion0"} <= blocks.keys()
-    for name, block in blocks.items():
-        assert block.kernel.declared, name
-        for declared in block.kernel.declared.values():
-            (reason,) = refined_reason(model, refined(declared, block.contacts, 0.1))
-            assert declared.cannot and declared.cannot in reason.what, name
+    told = set()
+    for stage in (RefineStage(model, (0, 1), (1, 2), active), carrying().stage, sketching().stage):
+        for name in stage.problem.constraint_rows:
+            block_name, constraint = name.split(".")
+            block = stage.built.blocks[block_name]
+            declared = block.kernel.declared[constraint]
+            (reason,) = refined_reason(stage.model, refined(declared, block.contacts, 0.1))
+            assert declared.cannot, name
+            assert declared.cannot in reason.what, name
+            told.add(name)
+    assert {"disturbed_ground.cone", "tool_point.on_path", "joint_motion0.speed", "fingers_apart1_0.clear"} <= told

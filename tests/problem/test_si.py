@@ -1,4 +1,4 @@
-"""What is written of a solved hand: where it stands, its motors, and its forces when it is pushed."""
+"""What is written of a solved hand: where it stands, its motors, and its forces when it is disturbed."""
 
 from __future__ import annotations
 
@@ -14,11 +14,8 @@ from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.motion import Motion
 from casadi_hands.problem.outcome import whole_hand_motion
 from casadi_hands.problem.si import build_model, hand_of, joint_loads
-from casadi_hands.stages.refine.result import Run
-from casadi_hands.stages.refine.settings import WEIGHTS
-from casadi_hands.stages.refine.values import Margin
 from casadi_hands.task import Task, parse_task
-from tests.stages.example import PinFinger, everything, everything_text, made_up_solution
+from tests.stages.example import PinFinger, everything, everything_text
 from tests.stages.refining import MadeUp, carrying, sketching
 
 KINDS = ("effort", "velocity")
@@ -31,13 +28,12 @@ def made_up() -> MadeUp:
 
 def written(made_up: MadeUp) -> tuple[WholeHand, Motion]:
     """The result of the made-up values, with the fingers as they start, and the motion that it is written as."""
-    solution = replace(made_up_solution(made_up.values), excess={"a": np.zeros(1)})
-    hand = made_up.stage._result(made_up.start, [Run("exact", solution, Margin())], {}, WEIGHTS).hand
+    hand = made_up.refined(made_up.solution()).hand
     hand = replace(hand, fingers=made_up.start.fingers, angles=made_up.start.angles)
     return hand, whole_hand_motion(made_up.model, hand)
 
 
-def test_forces_under_perturbations_are_kept_where_the_object_is_pushed(made_up: MadeUp) -> None:
+def test_forces_under_perturbations_are_kept_where_the_object_is_disturbed(made_up: MadeUp) -> None:
     hand, motion = written(made_up)
     model, units = made_up.model, made_up.model.units
     # The task pushes from 0.3 s to 0.9 s, and more from 0.5 s to 0.7 s.
@@ -52,7 +48,7 @@ def test_forces_under_perturbations_are_kept_where_the_object_is_pushed(made_up:
     np.testing.assert_allclose(motion.external_torque_disturbed, pushed[:, None] * [0, 0.004, 0], atol=1e-12)
     assert not motion.external_force.any()
     np.testing.assert_array_equal(motion.contact_force_disturbed[~pushed], motion.contact_force[~pushed])
-    forces = made_up.values["force_pushed"].reshape(pushed.sum(), 3, 3)
+    forces = made_up.values["force_disturbed"].reshape(pushed.sum(), 3, 3)
     reference = Rotation.from_quat(model.reference, scalar_first=True)
     for s, force in zip(np.flatnonzero(pushed), forces, strict=True):
         turn = Rotation.from_rotvec(hand.vector[s]) * reference

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
+from unittest.mock import patch
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from casadi_hands.nlp import Solution
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
+from casadi_hands.stages.refine.result import Refined
+from casadi_hands.stages.refine.settings import LAST
 from casadi_hands.stages.refine.stage import RefineStage
 from casadi_hands.stages.refine.values import Margin
 from tests.stages.example import drawing, everything, made_up_finger, made_up_solution, project
@@ -96,6 +101,18 @@ class MadeUp:
         g = np.asarray(self.stage.solver.functions["nlp"](x, p)[1]).ravel()
         return {name: g[rows] for name, rows in problem.constraint_rows.items()}
 
+    def solution(self, excess: Mapping[str, Array] | None = None) -> Solution:
+        """What a solver returns that ends at ``values`` and slips nowhere; by default nothing is violated."""
+        rows = self.stage.problem.constraint_rows
+        still = {name: np.zeros(rows[name].shape) for name in rows if name.endswith(".no_slip")}
+        excess = dict(excess or {"wrench.sum": np.zeros(rows["wrench.sum"].shape)})
+        return replace(made_up_solution(self.values), excess=excess, constraints=still)
+
+    def refined(self, solution: Solution, margin: Margin | None = None) -> Refined:
+        """What the stage makes of a solution that each of its solves returns."""
+        with patch.object(self.stage.solver, "solve", return_value=solution):
+            return self.stage.take(LAST, self.start, margin or Margin())
+
     @property
     def turns(self) -> list[Rotation]:
         """The object's orientations, by SciPy."""
@@ -119,5 +136,5 @@ def carrying(on_ground: int = 9) -> MadeUp:
 
 
 def sketching() -> MadeUp:
-    """A drawing, without a ground and without pushes; the second finger is lifted for a while."""
+    """A drawing, without a ground and without disturbances; the second finger is lifted for a while."""
     return MadeUp(drawing()[1], (0, 1), lifted={1: (4, 7)})

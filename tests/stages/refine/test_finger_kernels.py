@@ -68,15 +68,15 @@ class Contact:
         }
 
     @property
-    def held(self) -> Block:
+    def disturbed(self) -> Block:
         """The same of the kernel of a second force."""
         variables = {"pose": self.place.pose, "point": self.point, "angles": self.finger.angles[0], "force": self.force}
         return {**shape(self.finger), **variables}, {**self.scene, "friction": self.friction}
 
     @property
-    def supplied(self) -> Block:
+    def actuated(self) -> Block:
         """The same of the kernel of what no joint supplies."""
-        return self.held[0], self.scene
+        return self.disturbed[0], self.scene
 
 
 @pytest.mark.parametrize("joints", [1, 2, 3, 4])
@@ -147,18 +147,18 @@ def test_surfaces_touch_where_normals_are_opposed(joints: int, share: float, out
 def test_a_second_force_is_held_as_the_first(joints: int) -> None:
     case = Contact(joints, 7)
     first = numbers(finger_kernels.contact(joints, limited=True), *case.contact)
-    second = numbers(finger_kernels.held(joints, limited=True), *case.held)
+    second = numbers(finger_kernels.disturbed_contact(joints, limited=True), *case.disturbed)
     assert set(second) == {"pressing", "cone", "passive", "torque", "passive_force"}
     for name, value in second.items():
         np.testing.assert_allclose(value, first[name], rtol=1e-12, atol=1e-12)
-    third = numbers(finger_kernels.supplied(joints), *case.supplied)
+    third = numbers(finger_kernels.actuated(joints), *case.actuated)
     assert set(third) == {"passive", "passive_force"}
     for name, value in third.items():
         np.testing.assert_allclose(value, first[name], rtol=1e-12, atol=1e-12)
     # Turned about the normal, the force is as well within the cone; doubled, four times as far from its edge.
     turn = Rotation.from_rotvec(1.1 * case.normal)
     case.force = 2 * turn.apply(case.force)
-    other = numbers(finger_kernels.held(joints, limited=True), *case.held)
+    other = numbers(finger_kernels.disturbed_contact(joints, limited=True), *case.disturbed)
     np.testing.assert_allclose(other["pressing"], 2 * second["pressing"], rtol=1e-3)
     np.testing.assert_allclose(other["cone"], 4 * second["cone"], rtol=1e-2)
 
@@ -166,7 +166,7 @@ def test_a_second_force_is_held_as_the_first(joints: int) -> None:
 def test_torque_is_a_constraint_only_where_it_is_limited() -> None:
     assert "torque" in finger_kernels.contact(2, limited=True).constraints
     assert "torque" not in finger_kernels.contact(2, limited=False).constraints
-    assert "torque" not in finger_kernels.held(2, limited=False).constraints
+    assert "torque" not in finger_kernels.disturbed_contact(2, limited=False).constraints
     assert "speed" in finger_kernels.joint_motion(2, limited=True).constraints
     assert "speed" not in finger_kernels.joint_motion(2, limited=False).constraints
 
@@ -269,14 +269,14 @@ RADIUS, PALM_RADIUS, GROUND = 0.1, 1.2, -0.4
 
 
 def clearance_block(finger: FingerSeed, place: Place, primitives: Array) -> Block:
-    parameters = {"radius": RADIUS, "palm_radius": PALM_RADIUS, "ground": GROUND, "primitives": primitives}
+    parameters = {"radius": RADIUS, "palm_radius": PALM_RADIUS, "ground_height": GROUND, "primitives": primitives}
     variables = {**shape(finger), "pose": place.pose, "angles": finger.angles[0]}
     return variables, {"frames": frames(finger), **place.parameters, **parameters}
 
 
 def pair_block(one: FingerSeed, other: FingerSeed) -> Block:
-    variables = {**shape(one, "_a"), "angles_a": one.angles[0], **shape(other, "_b"), "angles_b": other.angles[0]}
-    return variables, {"frames_a": frames(one), "frames_b": frames(other), "radius": RADIUS}
+    variables = {**shape(one, "0"), "angles0": one.angles[0], **shape(other, "1"), "angles1": other.angles[0]}
+    return variables, {"frames0": frames(one), "frames1": frames(other), "radius": RADIUS}
 
 
 @pytest.mark.parametrize(("touched", "grounded"), [(None, False), (1, False), (None, True), (0, True)])
@@ -320,6 +320,10 @@ def test_clearances_of_two_fingers_are_those_of_coal() -> None:
 # What regularises.
 
 
+def stay_block(finger: FingerSeed, wanted: FingerSeed) -> Block:
+    return shape(finger), {f"wanted_{name}": value for name, value in shape(wanted).items()}
+
+
 def test_smoothness_and_staying() -> None:
     rng = np.random.default_rng(0)
     times, angles = np.array([0.0, 0.05, 0.15, 0.21]), rng.normal(size=(4, 2))
@@ -337,7 +341,7 @@ def test_smoothness_and_staying() -> None:
     found = numbers(finger_kernels.joint_jerk(2), {f"angles{i}": angles[i] for i in range(4)}, steps)
     np.testing.assert_allclose(found["joint_jerk"], sum(c.deriv(3)(0.0) ** 2 for c in curve), rtol=1e-9)
     finger, other = random_finger(2, rng), random_finger(2, rng)
-    found = numbers(finger_kernels.stay(2), shape(finger), shape(other))
+    found = numbers(finger_kernels.stay(2), *stay_block(finger, other))
     apart = [finger.base - other.base, finger.lengths - other.lengths, finger.axes - other.axes]
     np.testing.assert_allclose(found["stay_design"], sum((a**2).sum() for a in apart), rtol=1e-12)
     np.testing.assert_allclose(found["on_palm"], finger.base @ finger.base, rtol=1e-12)
@@ -355,8 +359,8 @@ def test_derivatives_agree_with_differences() -> None:
     for kernel, (variables, parameters) in (
         (finger_kernels.contact(2, limited=True), case.contact),
         (finger_kernels.contact(3, limited=True), Contact(3, 1).contact),
-        (finger_kernels.held(2, limited=True), case.held),
-        (finger_kernels.supplied(2), case.supplied),
+        (finger_kernels.disturbed_contact(2, limited=True), case.disturbed),
+        (finger_kernels.actuated(2), case.actuated),
         (finger_kernels.rolling(1), rolling_block(before, after)),
         (finger_kernels.apart(2, 2, 1, grounded=True), clearance_block(one, place, primitives)),
         (finger_kernels.fingers_apart(2, 3), pair_block(one, other)),
@@ -364,7 +368,7 @@ def test_derivatives_agree_with_differences() -> None:
             finger_kernels.joint_motion(2, limited=True),
             ({f"angles{i}": angles[i] for i in range(3)}, {"step0": STEP, "step1": 0.7 * STEP}),
         ),
-        (finger_kernels.stay(2), (shape(one), shape(random_finger(2, rng)))),
+        (finger_kernels.stay(2), stay_block(one, random_finger(2, rng))),
     ):
         check_block(kernel, variables, parameters)
 
@@ -377,4 +381,4 @@ def test_derivatives_are_finite_where_nothing_moves_and_nothing_presses() -> Non
     case.finger = replace(case.finger, axes=np.zeros((2, 2)), angles=np.zeros((1, 2)))
     case.place.vector, case.force = np.zeros(3), np.zeros(3)
     check_block(finger_kernels.contact(2, limited=True), *case.contact, h=1e-6)
-    check_block(finger_kernels.held(2, limited=True), *case.held, h=1e-6)
+    check_block(finger_kernels.disturbed_contact(2, limited=True), *case.disturbed, h=1e-6)

@@ -74,7 +74,7 @@ class Carried:
             "rate1": np.r_[self.end_rate[0] / LENGTH, self.end_rate[1]],
             "wrench0": self.wrench(self.points[0], self.forces[0]),
             "wrench1": self.wrench(self.points[1], self.forces[1]),
-            "middle": middle,
+            "middle_torque": middle,
         }
         parameters = {
             "reference": self.reference.as_quat(scalar_first=True),
@@ -120,10 +120,10 @@ def test_wrenches_are_sums_over_the_contacts() -> None:
     carried, rng = Carried(2), np.random.default_rng(0)
     points, forces = carried.points / LENGTH, carried.forces / WEIGHT
     total = rng.normal(size=6)
-    found = numbers(body.wrench(3), {"total": total, "points": points[0], "forces": forces[0]}, {})
+    found = numbers(body.wrench(3), {"wrench": total, "point": points[0], "force": forces[0]}, {})
     np.testing.assert_allclose(found["sum"], carried.wrench(carried.points[0], carried.forces[0]) - total, atol=1e-12)
-    ends = {"points0": points[0], "forces0": forces[0], "points1": points[1], "forces1": forces[1]}
-    found = numbers(body.middle_torque(3), {"middle": total[:3], **ends}, {})
+    ends = {"point0": points[0], "force0": forces[0], "point1": points[1], "force1": forces[1]}
+    found = numbers(body.middle_torque(3), {"middle_torque": total[:3], **ends}, {})
     halfway = carried.wrench(carried.points.mean(axis=0), carried.forces.mean(axis=0))[3:]
     np.testing.assert_allclose(found["sum"], halfway - total[:3], atol=1e-12)
 
@@ -145,13 +145,13 @@ def test_a_second_set_of_forces_holds_the_object_against_a_push(seed: int) -> No
 
     alone, pushed = hold(np.zeros(6)), hold(np.r_[force, torque])
     total = np.r_[alone.sum(axis=0), np.cross(points, alone).sum(axis=0)]
-    variables = {"pose": place.pose, "total": total, "points": points, "forces": pushed}
-    external = {"reference": place.parameters["reference"], "force": force, "torque": torque}
-    found = numbers(body.pushed(4), variables, external)
+    variables = {"pose": place.pose, "wrench": total, "point": points, "force": pushed}
+    external = {"reference": place.parameters["reference"], "external_force": force, "external_torque": torque}
+    found = numbers(body.disturbed(4), variables, external)
     np.testing.assert_allclose(found["sum"], 0, atol=1e-12)
     np.testing.assert_allclose(found["force_regularisation"], (pushed**2).sum(), rtol=1e-12)
     # The first forces do not hold the push as well: it is what is missing, in the object's frame.
-    found = numbers(body.pushed(4), {**variables, "forces": alone}, external)
+    found = numbers(body.disturbed(4), {**variables, "force": alone}, external)
     unheld = place.turn.inv().apply([force, torque]).ravel()
     np.testing.assert_allclose(found["sum"], unheld, atol=1e-12)
 
@@ -159,12 +159,12 @@ def test_a_second_set_of_forces_holds_the_object_against_a_push(seed: int) -> No
 def test_what_keeps_the_motion_smooth_and_near() -> None:
     rng = np.random.default_rng(0)
     before, after = rng.normal(size=(2, 6))
-    found = numbers(body.force_change(2), {"before": before, "after": after}, {})
+    found = numbers(body.force_change(2), {"force0": before, "force1": after}, {})
     np.testing.assert_allclose(found["force_change"], ((after - before) ** 2).sum(), rtol=1e-12)
     pose, wanted = rng.normal(size=(2, 6))
-    found = numbers(body.stay_on_path(), {"pose": pose}, {"wanted": wanted})
+    found = numbers(body.stay_on_path(), {"pose": pose}, {"wanted_pose": wanted})
     np.testing.assert_allclose(found["stay_path"], ((pose - wanted) ** 2).sum(), rtol=1e-12)
-    found = numbers(body.meet_goal(), {"pose": pose}, {"wanted": wanted})
+    found = numbers(body.meet_goal(), {"pose": pose}, {"goal_pose": wanted})
     np.testing.assert_allclose(found["goal"], ((pose - wanted) ** 2).sum(), rtol=1e-12)
 
 
@@ -215,7 +215,7 @@ class Lying:
 
 
 def touching(lying: Lying, point: Array, force: Array) -> Block:
-    parameters = {"reference": lying.quaternion, "capsule": CAPSULE, "height": HEIGHT, "friction": MU}
+    parameters = {"reference": lying.quaternion, "capsule": CAPSULE, "ground_height": HEIGHT, "friction": MU}
     wanted = {"wanted_point": point + 0.1, "wanted_force": force - [0, 0, 0.2]}
     return {"pose": lying.pose, "point": point, "force": force}, {**parameters, **wanted}
 
@@ -257,7 +257,7 @@ def test_a_ground_contact_s_numbers_are_those_of_scipy_s_rotations(seed: int) ->
     rng = np.random.default_rng(seed)
     place, (point, force, wanted_point, wanted_force) = Place(rng), rng.normal(size=(4, 3))
     reference = place.parameters["reference"]
-    parameters = {"reference": reference, "capsule": CAPSULE, "height": HEIGHT, "friction": MU}
+    parameters = {"reference": reference, "capsule": CAPSULE, "ground_height": HEIGHT, "friction": MU}
     wanted = {"wanted_point": wanted_point, "wanted_force": wanted_force}
     variables = {"pose": place.pose, "point": point, "force": force}
     found = numbers(body.ground_contact(), variables, {**parameters, **wanted})
@@ -269,7 +269,9 @@ def test_a_ground_contact_s_numbers_are_those_of_scipy_s_rotations(seed: int) ->
     np.testing.assert_allclose(found["cone"], (MU * exerted[2]) ** 2 - exerted[0] ** 2 - exerted[1] ** 2, atol=1e-12)
     np.testing.assert_allclose(found["stay_point"], ((point - wanted_point) ** 2).sum(), rtol=1e-12)
     np.testing.assert_allclose(found["stay_force"], ((force - wanted_force) ** 2).sum(), rtol=1e-12)
-    second = numbers(body.ground_held(), {"pose": place.pose, "force": force}, {"reference": reference, "friction": MU})
+    second = numbers(
+        body.disturbed_ground(), {"pose": place.pose, "force": force}, {"reference": reference, "friction": MU}
+    )
     assert set(second) == {"pressing", "cone"}
     for name, value in second.items():
         np.testing.assert_allclose(value, found[name], rtol=1e-12)
@@ -339,7 +341,7 @@ def test_a_capsule_that_slides_slips_by_its_path_and_one_that_lies_still_does_no
 
 
 def clear_block(place: Place, primitives: Array, palm_radius: float = 0.8, ground: float = -0.6) -> Block:
-    sizes = {"palm_radius": palm_radius, "ground": ground, "primitives": primitives}
+    sizes = {"palm_radius": palm_radius, "ground_height": ground, "primitives": primitives}
     return {"pose": place.pose}, {**place.parameters, **sizes}
 
 
@@ -409,24 +411,24 @@ def test_derivatives_agree_with_differences() -> None:
     reference = {"reference": place.parameters["reference"]}
     after = lying.moved(Rotation.from_rotvec([0.1, 0.2, -0.1]), np.zeros(3), (0.1, 0.2))
     points, forces = rng.normal(size=(2, 12))
-    ends = {"points0": points[:6], "forces0": forces[:6], "points1": points[6:], "forces1": forces[6:]}
+    ends = {"point0": points[:6], "force0": forces[:6], "point1": points[6:], "force1": forces[6:]}
     primitives = np.hstack([rng.normal(size=(2, 6)), [[0.2], [0.3]]])
     for kernel, (variables, parameters) in (
         (body.physics(), Carried(0).physics()),
-        (body.wrench(2), ({"total": rng.normal(size=6), "points": points[:6], "forces": forces[:6]}, {})),
-        (body.middle_torque(2), ({"middle": rng.normal(size=3), **ends}, {})),
+        (body.wrench(2), ({"wrench": rng.normal(size=6), "point": points[:6], "force": forces[:6]}, {})),
+        (body.middle_torque(2), ({"middle_torque": rng.normal(size=3), **ends}, {})),
         (
-            body.pushed(4),
+            body.disturbed(4),
             (
-                {"pose": place.pose, "total": rng.normal(size=6), "points": points, "forces": forces},
-                {**reference, "force": force, "torque": torque},
+                {"pose": place.pose, "wrench": rng.normal(size=6), "point": points, "force": forces},
+                {**reference, "external_force": force, "external_torque": torque},
             ),
         ),
-        (body.force_change(2), ({"before": forces[:6], "after": forces[6:]}, {})),
-        (body.stay_on_path(), ({"pose": place.pose}, {"wanted": rng.normal(size=6)})),
-        (body.meet_goal(), ({"pose": place.pose}, {"wanted": rng.normal(size=6)})),
+        (body.force_change(2), ({"force0": forces[:6], "force1": forces[6:]}, {})),
+        (body.stay_on_path(), ({"pose": place.pose}, {"wanted_pose": rng.normal(size=6)})),
+        (body.meet_goal(), ({"pose": place.pose}, {"goal_pose": rng.normal(size=6)})),
         (body.ground_contact(), touching(lying, lying.beneath(0.4) + 0.1, force)),
-        (body.ground_held(), ({"pose": place.pose, "force": force}, {**reference, "friction": MU})),
+        (body.disturbed_ground(), ({"pose": place.pose, "force": force}, {**reference, "friction": MU})),
         (body.ground_rolling(), slipping(lying, lying.beneath(0.4), after, after.beneath(0.6))),
         (body.object_apart(2, True), clear_block(place, primitives)),
         (body.tool_point(), ({"pose": place.pose}, {**reference, "tool": force, "target": torque})),

@@ -82,16 +82,16 @@ def test_a_contact_is_held_to_its_surfaces_until_it_lifts(loaded: MadeUp) -> Non
     assert len(rows["apart2.clear"]) == (~touching[:, 1]).sum()
     assert len(rows["apart_touching2.clear"]) == touching[:, 1].sum()
     assert len(rows["fingers_apart2_0.clear"]) == len(active)
-    pushed = (loaded.model.schedule.samples > 0.3 - 1e-9) & (loaded.model.schedule.samples < 0.9 + 1e-9)
-    np.testing.assert_array_equal(loaded.stage.given.pushed, np.flatnonzero(pushed))
-    for name, contact in (("held0", 0), ("held2", 2), ("ground_held", 3)):
-        assert len(rows[f"{name}.pressing"]) == (pushed & active[:, contact]).sum() > 0
+    disturbed = (loaded.model.schedule.samples > 0.3 - 1e-9) & (loaded.model.schedule.samples < 0.9 + 1e-9)
+    np.testing.assert_array_equal(loaded.stage.built.disturbed, np.flatnonzero(disturbed))
+    for name, contact in (("disturbed_contact0", 0), ("disturbed_contact2", 2), ("disturbed_ground", 3)):
+        assert len(rows[f"{name}.pressing"]) == (disturbed & active[:, contact]).sum() > 0
 
 
 def test_the_object_is_kept_off_the_ground_whether_or_not_it_bears_load(loaded: MadeUp, unloaded: MadeUp) -> None:
     has = set(loaded.stage.problem.constraint_rows)
-    ground = {name for name in has if name.startswith("ground")}
-    assert {name.split(".")[0] for name in ground} == {"ground", "ground_rolling", "ground_held"}
+    ground = {name for name in has if name.split(".")[0] in ("ground", "ground_rolling", "disturbed_ground")}
+    assert {name.split(".")[0] for name in ground} == {"ground", "ground_rolling", "disturbed_ground"}
     assert set(unloaded.stage.problem.constraint_rows) == has - ground
     assert "object_apart.ground" in has
     assert loaded.stage.problem.variables["force"].shape[1] == 9
@@ -107,12 +107,12 @@ def test_wrenches_are_those_of_all_contacts_at_every_knot(case: MadeUp) -> None:
     np.testing.assert_allclose(found["middle_torque.sum"], middle - values["middle_torque"], atol=1e-12)
 
 
-def test_pushes_are_held_at_their_time(loaded: MadeUp) -> None:
+def test_disturbances_are_held_at_their_time(loaded: MadeUp) -> None:
     model, values = loaded.model, loaded.values
-    second = values["force_pushed"].reshape(-1, 3, 3)
-    found = loaded.constraints(WEIGHTS)["pushed.sum"]
+    second = values["force_disturbed"].reshape(-1, 3, 3)
+    found = loaded.constraints(WEIGHTS)["disturbed.sum"]
     assert len(found) == len(second)
-    for row, k, forces in zip(found, loaded.stage.given.pushed, second, strict=True):
+    for row, k, forces in zip(found, loaded.stage.built.disturbed, second, strict=True):
         inverse = loaded.turns[k].inv()
         force = forces.sum(axis=0) + inverse.apply(model.disturbance_force[k])
         torque = np.cross(loaded.points[k], forces).sum(axis=0) + inverse.apply(model.disturbance_torque[k])
@@ -140,10 +140,10 @@ def test_the_ground_is_where_it_is_while_it_bears_load(loaded: MadeUp) -> None:
         mean = (loaded.turns[k].as_matrix() + loaded.turns[k + 1].as_matrix()) / 2
         halfway = mean @ (3 * np.eye(3) - mean.T @ mean) / 2
         np.testing.assert_allclose(row, (halfway @ arc - world[k + 1] + world[k])[:2], atol=2e-3)
-    second = loaded.values["force_pushed"].reshape(-1, 3, 3)[:, 2]
-    held = [(k, f) for k, f in zip(loaded.stage.given.pushed, second, strict=True) if loaded.active[k, 3]]
+    second = loaded.values["force_disturbed"].reshape(-1, 3, 3)[:, 2]
+    held = [(k, f) for k, f in zip(loaded.stage.built.disturbed, second, strict=True) if loaded.active[k, 3]]
     expected = [loaded.turns[k].apply(f)[2] for k, f in held]
-    np.testing.assert_allclose(found["ground_held.pressing"].ravel(), expected, atol=1e-12)
+    np.testing.assert_allclose(found["disturbed_ground.pressing"].ravel(), expected, atol=1e-12)
 
 
 def test_times_between_knots_divide_their_intervals_evenly() -> None:
@@ -163,15 +163,15 @@ def wide() -> MadeUp:
     return MadeUp(resampled_model(model, model.schedule.stepped(0.3)), (0, 2), lifted={2: (2, 4)}, guarded=True)
 
 
-def test_forces_are_supplied_in_the_middle_between_knots_too(loaded: MadeUp) -> None:
+def test_forces_are_actuated_in_the_middle_between_knots_too(loaded: MadeUp) -> None:
     model, values, found = loaded.model, loaded.values, loaded.constraints(WEIGHTS)
     palms = Rotation.from_quat(model.palm_quaternion, scalar_first=True)
     turning = Slerp(np.arange(len(palms)), palms)
     for i, c in enumerate((0, 2)):
         finger = loaded.start.fingers[i]
         intervals = np.flatnonzero(loaded.active[:-1, c])
-        assert len(found[f"midway{c}.passive"]) == len(intervals)
-        for row, k in zip(found[f"midway{c}.passive"], intervals, strict=True):
+        assert len(found[f"inter_knot{c}.passive"]) == len(intervals)
+        for row, k in zip(found[f"inter_knot{c}.passive"], intervals, strict=True):
             moving = (values["pose"], loaded.points[:, i], values[f"angles{c}"], loaded.forces[:, i])
             middles = [(array[k] + array[k + 1]) / 2 for array in moving]
             variables = {name: values[f"{name}{c}"] for name in ("base", "lengths", "axes")}
@@ -184,7 +184,7 @@ def test_forces_are_supplied_in_the_middle_between_knots_too(loaded: MadeUp) -> 
                 "radius": model.link_radius,
             }
             variables |= dict(zip(("pose", "point", "angles", "force"), middles, strict=True))
-            expected = numbers(finger_kernels.supplied(finger.joints), variables, parameters)
+            expected = numbers(finger_kernels.actuated(finger.joints), variables, parameters)
             np.testing.assert_allclose(row, expected["passive"], atol=1e-12)
 
 
@@ -207,7 +207,7 @@ def test_lifted_fingers_are_clear_in_the_middle_between_knots_too(loaded: MadeUp
             "palm_quaternion": turning(k + 0.5).as_quat(scalar_first=True),
             "radius": model.link_radius,
             "palm_radius": model.palm_radius,
-            "ground": model.ground_height,
+            "ground_height": model.ground_height,
             "primitives": model.primitives,
         }
         np.testing.assert_allclose(row, numbers(kernel, variables, parameters)["clear"], atol=1e-12)
@@ -222,7 +222,7 @@ def test_guarded_fingers_are_clear_of_each_other_every_tenth_of_a_second(loaded:
         assert parts > 1
         for share in np.arange(1, parts) / parts:
             variables, parameters = {}, {}
-            for tag, i, c in (("_a", 1, 2), ("_b", 0, 0)):
+            for tag, i, c in (("0", 1, 2), ("1", 0, 0)):
                 variables |= {f"{name}{tag}": values[f"{name}{c}"] for name in ("base", "lengths", "axes")}
                 variables[f"angles{tag}"] = (1 - share) * values[f"angles{c}"][k] + share * values[f"angles{c}"][k + 1]
                 parameters[f"frames{tag}"] = frames(wide.start.fingers[i])
@@ -262,8 +262,10 @@ def test_goals_cost_what_the_object_is_off_them(loaded: MadeUp) -> None:
 
 
 def test_every_weight_moves_its_own_term(case: MadeUp) -> None:
-    weights = {name: WEIGHTS[name] or 1.0 for name in case.stage.problem.terms}  # anchors weigh in projections only
-    # Second forces are there for pushes alone.
+    weights = {
+        name: WEIGHTS[name] or 1.0 for name in case.stage.problem.terms
+    }  # the proximal term weighs in restorations only
+    # Second forces are there for disturbances alone.
     assert set(WEIGHTS) - set(weights) == ({"force_regularisation"} if case.model.tool is not None else set())
     evaluate = case.stage.solver.evaluate
     plain = evaluate(case.values, case.parameters(weights))  # type: ignore[arg-type]

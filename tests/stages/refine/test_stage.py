@@ -22,13 +22,14 @@ from casadi_hands.stages.floating.stage import FloatingStage
 from casadi_hands.stages.refine import continuation
 from casadi_hands.stages.refine import stage as refine
 from casadi_hands.stages.refine.continuation import Continuation
-from casadi_hands.stages.refine.result import Refined, Run, Worst
+from casadi_hands.stages.refine.result import Refined, Worst
 from casadi_hands.stages.refine.settings import ACCEPTED, HARD, HOPELESS, LONG_WAY, PROJECTION, WEIGHTS
 from casadi_hands.stages.refine.stage import RefineStage
 from casadi_hands.stages.refine.values import TOOL_TOLERANCE, Margin, RefineValues, longest_run
 from casadi_hands.task import Task, load_task
+from casadi_hands.terms import constraints as limits
 from casadi_hands.verify import Audit, audit_files
-from tests.stages.example import STAND, made_up_solution, project
+from tests.stages.example import STAND, project
 from tests.stages.refining import MadeUp, carrying, sketching
 from tests.stages.searched import whole_hand_of_two_joints
 
@@ -55,15 +56,15 @@ def test_forces_vanish_where_contacts_bear_nothing_and_the_object_rests_at_both_
     for column in range(3):
         for row in range(3 * column, 3 * column + 3):
             np.testing.assert_array_equal(upper["force"][:, row] == 0, ~made_up.bearing[:, column])
-    pushed = made_up.stage.given.pushed
-    # What holds against a push that begins with a touch need not grow.
-    active = made_up.stage.structure.active[pushed]
-    np.testing.assert_array_equal(upper["force_pushed"][:, ::3] > 0, active)
-    assert (active & ~made_up.bearing[pushed]).any()
+    disturbed = made_up.stage.built.disturbed
+    # What holds against a disturbance that begins with a touch need not grow.
+    active = made_up.stage.structure.active[disturbed]
+    np.testing.assert_array_equal(upper["force_disturbed"][:, ::3] > 0, active)
+    assert (active & ~made_up.bearing[disturbed]).any()
     assert not active.all()
     np.testing.assert_array_equal(upper["rate"][[0, -1]], 0)
     assert np.isinf(upper["rate"][1:-1]).all()
-    for name in ("force", "force_pushed", "rate"):
+    for name in ("force", "force_disturbed", "rate"):
         np.testing.assert_array_equal(upper[name], -lower[name])
 
 
@@ -103,9 +104,9 @@ def test_margins_are_bounds_of_contacts_while_they_bear(made_up: MadeUp) -> None
     assert high == np.inf
     exact = {name: bounds for part in others for name, bounds in part.items()}
     for c in (0, 2):
-        for kernel in ("contact", "held"):
-            assert exact[f"{kernel}{c}.passive"] == (-0.02, 0.02)
-        assert exact[f"midway{c}.passive"] == pytest.approx((-0.2, 0.2))
+        for block in ("contact", "disturbed_contact"):
+            assert exact[f"{block}{c}.passive"] == (-0.02, 0.02)
+        assert exact[f"inter_knot{c}.passive"] == pytest.approx((-0.2, 0.2))
     # None of them is the name of nothing.
     assert {*always, *exact} <= set(made_up.stage.problem.constraint_rows)
 
@@ -176,8 +177,8 @@ def test_friction_keeps_its_margin_on_fingers_and_ground(made_up: MadeUp) -> Non
 def test_a_result_has_every_contact_in_its_own_place(made_up: MadeUp) -> None:
     # The middle finger is not in use: its point stays, and it bears nothing.
     start, values = made_up.start, made_up.values
-    solution = replace(made_up_solution(values), excess={"a": np.array([ACCEPTED]), "b": np.zeros(2)})
-    refined = made_up.stage._result(start, [Run("exact", solution, Margin(friction=0.3))], {}, WEIGHTS)
+    excess = {"stay0.on_palm": np.array([[ACCEPTED]]), "stay2.on_palm": np.zeros((1, 1))}
+    refined = made_up.refined(made_up.solution(excess), Margin(friction=0.3))
     assert refined.margin == Margin(friction=0.3)
     hand, count = refined.hand, len(start.position)
     for column, contact in enumerate((0, 2, 3)):
@@ -190,7 +191,7 @@ def test_a_result_has_every_contact_in_its_own_place(made_up: MadeUp) -> None:
     assert not hand.active[:, 1].any()
     np.testing.assert_array_equal(np.hstack([hand.position, hand.vector]), values["pose"])
     assert refined.exact
-    assert refined.worst == Worst("a", ACCEPTED, None)
+    assert refined.worst == Worst("stay0.on_palm", ACCEPTED, None, (0,), limits.ON_PALM)
     # Nor is it a contact of the motion that is written: no link is there to touch.
     first, _, last = made_up.model.contact_names
     motion = whole_hand_motion(made_up.model, replace(hand, fingers=start.fingers, angles=start.angles))
@@ -202,34 +203,36 @@ def test_a_result_has_every_contact_in_its_own_place(made_up: MadeUp) -> None:
 
 @pytest.mark.parametrize("violation", [1.01 * ACCEPTED, np.inf])
 def test_a_motion_that_violates_is_not_exact(made_up: MadeUp, violation: float) -> None:
-    solution = replace(made_up_solution(made_up.values), excess={"a": np.zeros(1), "b": np.array([0.0, violation])})
-    refined = made_up.stage._result(made_up.start, [Run("exact", solution, Margin(friction=0.3))], {}, WEIGHTS)
+    refined = made_up.refined(
+        made_up.solution({name: np.array([[x]]) for name, x in (("stay0.on_palm", 0.0), ("stay2.on_palm", violation))})
+    )
     assert not refined.exact
-    assert refined.worst == Worst("b", violation, None)
+    assert refined.worst == Worst("stay2.on_palm", violation, None, (2,), limits.ON_PALM)
 
 
 @pytest.mark.parametrize(
-    ("constraint", "instance", "sample"),
+    ("constraint", "instance", "sample", "contacts"),
     [
         # The second finger in use is lifted in samples 4 to 6; its point is on both bodies until the first of these.
-        ("contact2.on_link", 5, 7),
-        ("rolling2.no_slip", 4, 7),
-        ("apart2.clear", 1, 6),
-        ("contact0.cone", 5, 5),
-        ("held2.cone", 1, 7),
-        ("pushed.sum", 0, 3),
-        ("physics.defect", 14, 14),
+        ("contact2.on_link", 5, 7, (2,)),
+        ("rolling2.no_slip", 4, 7, (2,)),
+        ("apart2.clear", 1, 6, (2,)),
+        ("contact0.cone", 5, 5, (0,)),
+        ("disturbed_contact2.cone", 1, 7, (2,)),
+        ("disturbed.sum", 0, 3, ()),
+        ("physics.defect", 14, 14, ()),
+        ("fingers_apart2_0.clear", 6, 6, (2, 0)),
     ],
 )
-def test_the_time_of_the_worst_violation_is_that_of_its_knot(
-    made_up: MadeUp, constraint: str, instance: int, sample: int
+def test_the_worst_violation_is_told_with_its_time_and_whom_it_is_about(
+    made_up: MadeUp, constraint: str, instance: int, sample: int, contacts: tuple[int, ...]
 ) -> None:
     rows = made_up.stage.problem.constraint_rows[constraint]
     excess = np.zeros(rows.shape)
     excess[instance, -1] = 2.0
-    solution = replace(made_up_solution(made_up.values), excess={constraint: excess, "other.one": np.ones(3)})
-    worst = made_up.stage._worst(solution)
-    assert (worst.constraint, worst.violation) == (constraint, 2.0)
+    worst = made_up.refined(made_up.solution({constraint: excess, "stay0.on_palm": np.ones((1, 1))})).worst
+    assert (worst.constraint, worst.violation, worst.contacts) == (constraint, 2.0, contacts)
+    assert worst.declared.name == constraint.split(".")[1]
     assert worst.time == pytest.approx(made_up.model.schedule.samples[sample])
 
 
@@ -265,12 +268,11 @@ def test_costs_hold_near_to_the_wanted_motion_and_constraints_to_where_it_is(mad
 
 def test_a_start_that_is_no_number_is_never_accepted(drawn: MadeUp) -> None:
     # IPOPT does not even begin; what it says of such a solve is that nothing is violated.
-    bad = replace(drawn.start, point=np.full_like(drawn.start.point, np.nan))
     values = drawn.stage.given.start(drawn.start) | {"point": np.full_like(drawn.values["point"], np.nan)}
     solution = drawn.stage.solver.solve(values, drawn.parameters(WEIGHTS), HARD)
     assert solution.objective == np.inf
     assert solution.violations["wrench.sum"] == np.inf
-    assert not drawn.stage._result(bad, [Run("exact", solution, Margin(friction=0.3))], {}, WEIGHTS).exact
+    assert not drawn.refined(solution).exact
 
 
 # A solve: figure 3.6a with two joints a finger, from three random starts each.
