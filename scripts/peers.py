@@ -7,7 +7,7 @@ program's own stage 1 has as constraints too, are left out for all: friction is 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from typing import Any
@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from casadi_hands.nlp import Kernel, Options, Problem, Rows, Solution, Solver, derivatives, machine_code
+from casadi_hands.nlp import Kernel, Options, Parameter, Problem, Rows, Solution, Solver, derivatives, machine_code
+from casadi_hands.nlp.arguments import arguments_by_name
 from casadi_hands.nlp.assembly import to_dm
 
 Vector = NDArray[np.float64]
@@ -200,11 +201,19 @@ def _scipy_attempt(name: str, gradient: ca.Function, posed: Posed, limit: float)
 
 @dataclass(frozen=True)
 class Bind:
-    """What ``Problem.bind`` was called with."""
+    """What ``Problem.bind`` was called with; arguments are in the order of the kernel's symbols."""
 
     kernel: Kernel
-    variables: Sequence[Rows]
-    parameters: Sequence[NDArray[np.int64]]
+    variables: list[Rows]
+    parameters: list[NDArray[np.int64]]
+
+    @classmethod
+    def of(cls, kernel: Kernel, arguments: Mapping[str, Any]) -> Bind:
+        """Arguments as they are given, by name."""
+        given = arguments_by_name(kernel, arguments)
+        rows = [rows for local in kernel.local_variables if isinstance(rows := given[local.name], Rows)]
+        read = [p.positions for local in kernel.local_parameters if isinstance(p := given[local.name], Parameter)]
+        return cls(kernel, rows, read)
 
 
 @contextmanager
@@ -213,9 +222,9 @@ def recorded_binds() -> Iterator[list[Bind]]:
     binds: list[Bind] = []
     original = Problem.bind
 
-    def bind(self: Problem, kernel: Kernel, variables: Any, parameters: Any = (), *rest: Any, **named: Any) -> None:
-        binds.append(Bind(kernel, variables, parameters))
-        original(self, kernel, variables, parameters, *rest, **named)
+    def bind(self: Problem, kernel: Kernel, bounds: Any = None, block: str = "", /, **arguments: Any) -> None:
+        binds.append(Bind.of(kernel, arguments))
+        original(self, kernel, bounds, block, **arguments)
 
     Problem.bind = bind  # type: ignore[method-assign]
     try:

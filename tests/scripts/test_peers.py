@@ -10,7 +10,7 @@ import pytest
 from peers import Method, Posed, by_scipy, opti, opti_cost, ours, recorded_binds, recorded_solves
 from scipy.optimize import minimize, rosen
 
-from casadi_hands.nlp import Kernel, Options, Problem, Solver
+from casadi_hands.nlp import Constraint, Kernel, Options, Problem, Solver, Term
 
 OPTIONS = Options(tol=1e-9, acceptable_tol=1e-9)
 START = np.array([0.1, 0.6, -0.2, 0.4])
@@ -30,20 +30,24 @@ class Valley:
 
     def __init__(self) -> None:
         kernel = Kernel("valley")
-        x, y, shift = kernel.variable("x", 1), kernel.variable("y", 1), kernel.parameter("shift")
-        kernel.cost("bend", y - shift - (x - shift) ** 2)
-        kernel.cost("way", 1 - (x - shift))
-        kernel.constrain("sum", x + y)
+        # Its symbols in another order than they are bound in, where names alone tell them apart.
+        width = kernel.parameter("width")
+        x, y = (kernel.variable(f"x{i}", 1, "x", i) for i in range(2))
+        shift = kernel.parameter("shift")
+        kernel.cost(Term("bend"), y - shift - (x - shift) ** 2)
+        kernel.cost(Term("way"), (1 - (x - shift)) / width)
+        kernel.constrain(Constraint("sum"), x + y)
         problem = Problem()
-        point = problem.variable("point", (4, 1))
+        point = problem.variable("point", (4, 1), quantity="x")
         problem.variable("unused", (1, 1), -1, 1)
-        shift_at = problem.parameter("shift", (1, 1))
-        rows = [point.take([0, 1, 2]), point.take([1, 2, 3])]
-        problem.bind(kernel, rows, [shift_at], {"sum": (-50.0, 0.5)}, "dale")
+        for name in ("shift", "width"):
+            problem.parameter(name, (1, 1))
+        both = point.take([0, 1, 2]), point.take([1, 2, 3])
+        problem.bind(kernel, {"sum": (-50.0, 0.5)}, "dale", x=both, **problem.given("shift", "width"))
         self.solver = Solver(problem)
 
     def solve(self) -> None:
-        parameters = {"shift": 0.3, "weight.bend": 100.0, "weight.way": 1.0}
+        parameters = {"shift": 0.3, "width": 1.0, "weight.bend": 100.0, "weight.way": 1.0}
         upper = {"point": np.array([[0.8], [5], [5], [5]])}
         self.solver.solve({"point": START[:, None] + 0.3}, parameters, OPTIONS, {"point": np.array(-5.0)}, upper=upper)
 
@@ -61,7 +65,7 @@ def test_programs_are_recorded_as_they_were_posed(posed: Posed) -> None:
     np.testing.assert_array_equal(posed.start, [*(START + 0.3), 0])
     np.testing.assert_array_equal(posed.lower, [-5, -5, -5, -5, -1])
     np.testing.assert_array_equal(posed.upper, [0.8, 5, 5, 5, 1])
-    np.testing.assert_array_equal(posed.parameters, [0.3, 100, 1])
+    np.testing.assert_array_equal(posed.parameters, [0.3, 1, 100, 1])
     assert posed.options is OPTIONS
 
 
@@ -103,7 +107,7 @@ def test_a_limit_of_time_leaves_the_best_until_then(name: str, posed: Posed) -> 
 def test_the_cost_written_for_opti_is_the_problem_s(posed: Posed) -> None:
     with recorded_binds() as binds:
         problem = Valley().solver.problem
-    x, p = ca.MX.sym("x", 5), ca.MX.sym("p", 3)
+    x, p = ca.MX.sym("x", 5), ca.MX.sym("p", 4)
     cost = ca.Function("cost", [x, p], [opti_cost(problem, binds, x, p)])
     for point in np.random.default_rng(0).uniform(-2, 2, (5, 4)):
         assert float(cost([*(point + 0.3), 0.1], posed.parameters)) == pytest.approx(rosen(point), rel=1e-12)
