@@ -26,7 +26,9 @@ from tests.pipeline.replayed import replayed
 from tests.stages.example import made_up_solution
 from tests.stages.synthesis.example import ball_target, ball_task, hand, pointing
 
-Verdict = tuple[int, str, bool]  # limits missed, the constraint that was worst, whether it slips hopelessly
+Verdict = tuple[
+    int, tuple[int, ...], bool
+]  # limits missed, contacts that cannot meet them, whether it slips hopelessly
 
 
 def found(*joints: tuple[int, int], farthest: float = 0.0) -> Found:
@@ -59,14 +61,14 @@ class Loop(Certifier):
         return found((arguments[-1][0], arguments[-1][1]))
 
     def _certify(self, candidate: Candidate, short: Any) -> tuple[Design, Any, int]:
-        missed, worst, slips = self.verdicts[len(self.tried)]
+        missed, contacts, slips = self.verdicts[len(self.tried)]
         self.tried.append(candidate.joints)
         refined = SimpleNamespace(
             met=False,
             slips_hopelessly=slips,
             barely_rolls=slips,
             slips={"left": 1.0, "right": 0.1},
-            worst=Worst(worst, 1.0, None),
+            worst=Worst("some.constraint", 1.0, None, contacts),
             share=1.0,
         )
         self.record.add_runs([{"stage": "refine", "what": len(self.tried)}])
@@ -78,7 +80,7 @@ class Loop(Certifier):
 
 
 def test_the_first_certified_hand_is_returned(monkeypatch: pytest.MonkeyPatch) -> None:
-    loop = Loop(monkeypatch, [(2, "physics.defect", False), (0, "", False)], max_joints=3)
+    loop = Loop(monkeypatch, [(2, (), False), (0, (), False)], max_joints=3)
     assert loop.run(found((1, 1), (1, 1), (1, 1))).status == "certified"
     assert loop.tried == [(1, 1), (1, 1)]
 
@@ -89,7 +91,7 @@ def test_a_certified_hand_that_drops_the_object_makes_way_for_one_that_drops_it_
     cases = (([12, 0], 2, 2), ([12, 5], 2, 2), ([5, 12], 1, 2), ([2, 0], 2, 2), ([1, 0], 1, 1))
     # Those that drop it more often than not make way for all the others.
     for dropped, best, tried in (*cases, ([12, 7, 3], 3, 3), ([12, 7, 8], 2, 3), ([8, 6, 0], 2, 2)):
-        loop = Loop(monkeypatch, 3 * [(0, "", False)], max_joints=3)
+        loop = Loop(monkeypatch, 3 * [(0, (), False)], max_joints=3)
         loop.dropped = dropped
         assert loop.run(found((1, 1), (1, 1), (1, 1))).reason == f"attempt {best}"
         assert len(loop.tried) == tried
@@ -98,8 +100,8 @@ def test_a_certified_hand_that_drops_the_object_makes_way_for_one_that_drops_it_
 
 
 def test_the_finger_that_failed_gets_a_joint_until_none_may(monkeypatch: pytest.MonkeyPatch) -> None:
-    verdicts = [(3, "contact1.passive", False), (4, "contact1.cone", False), (1, "contact1.cone", False)]
-    loop = Loop(monkeypatch, [*verdicts, (2, "contact1.cone", False)], max_joints=3)
+    verdicts = [(3, (1,), False), (4, (1,), False), (1, (1,), False)]
+    loop = Loop(monkeypatch, [*verdicts, (2, (1,), False)], max_joints=3)
     design = loop.run(found((1, 1), (1, 1)))
     assert loop.tried == [(1, 1), (1, 1), (1, 2), (1, 3)]
     assert loop.least == [{0: 1, 1: 2}, {0: 1, 1: 3}]
@@ -109,8 +111,8 @@ def test_the_finger_that_failed_gets_a_joint_until_none_may(monkeypatch: pytest.
 
 
 def test_all_hands_are_tried_where_no_finger_may_have_another_joint(monkeypatch: pytest.MonkeyPatch) -> None:
-    verdicts = 3 * [(1, "contact1.cone", False)]
-    loop = Loop(monkeypatch, [*verdicts, (0, "", False)], max_joints=1)
+    verdicts = 3 * [(1, (1,), False)]
+    loop = Loop(monkeypatch, [*verdicts, (0, (), False)], max_joints=1)
     assert loop.run(found((1, 1), (1, 1), (1, 1), (1, 1))).status == "certified"
     loop = Loop(monkeypatch, verdicts, max_joints=2)
     loop.run(found((1, 1), (1, 1), (1, 1), (1, 1)))
@@ -118,13 +120,13 @@ def test_all_hands_are_tried_where_no_finger_may_have_another_joint(monkeypatch:
 
 
 def test_where_no_finger_is_to_blame_those_with_fewest_joints_get_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    loop = Loop(monkeypatch, [(1, "physics.defect", False), (0, "", False)], max_joints=3)
+    loop = Loop(monkeypatch, [(1, (), False), (0, (), False)], max_joints=3)
     assert loop.run(found((2, 1))).status == "certified"
     assert loop.least == [{0: 2, 1: 2}]
 
 
 def test_a_structure_that_must_slip_is_tried_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    loop = Loop(monkeypatch, [(1, "rolling0.no_slip", True), (0, "", False)], max_joints=3)
+    loop = Loop(monkeypatch, [(1, (0,), True), (0, (), False)], max_joints=3)
     assert loop.run(found((1, 1), (1, 1))).status == "certified"
     assert loop.least == [{0: 2, 1: 1}]
 
@@ -139,7 +141,7 @@ def test_a_design_there_is_already_is_returned_where_no_hand_is_better(monkeypat
     # Limits missed and replays dropped by that design and by the two hands, and which of them is best.
     cases = (((2, 0), (2, 3), 0), ((2, 0), (3, 1), 2), ((0, 4), (1, 2), 0), ((0, 4), (0, 0), 1))
     for known, (first, second), best in cases:
-        loop = Loop(monkeypatch, [(first, "contact1.cone", False), (second, "contact1.cone", False)], max_joints=1)
+        loop = Loop(monkeypatch, [(first, (1,), False), (second, (1,), False)], max_joints=1)
         loop.dropped = [0, 0]
         status = "failed" if known[0] else "certified"
         certificate = {str(i): {"holds": i >= known[0]} for i in range(9)}
