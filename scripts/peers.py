@@ -256,7 +256,7 @@ def _times(rows: Rows, size: int, x: ca.MX) -> ca.MX:
     """What instances read, (d, K); columns of variables that were declared later are added."""
     matrix = rows.matrix.copy()
     matrix.resize((matrix.shape[0], size))
-    return ca.reshape(ca.mtimes(to_dm(matrix), x), rows.width, rows.count)
+    return ca.reshape(ca.mtimes(to_dm(matrix), x) + rows.offset, rows.width, rows.count)
 
 
 def opti(build: Build, programs: Sequence[Posed], limit: float, *, expand: bool = False) -> Run:

@@ -14,6 +14,7 @@ from casadi_hands.nlp import Constraint, Kernel, Options, Problem, Solver, Term
 
 OPTIONS = Options(tol=1e-9, acceptable_tol=1e-9)
 START = np.array([0.1, 0.6, -0.2, 0.4])
+MOVED = 0.2  # that kernels read the variables by
 METHODS: dict[str, Method] = {
     "ours": ours,
     "limited memory": partial(ours, limited_memory=True),
@@ -42,12 +43,13 @@ class Valley:
         problem.variable("unused", (1, 1), -1, 1)
         for name in ("shift", "width"):
             problem.parameter(name, (1, 1))
-        both = point.take([0, 1, 2]), point.take([1, 2, 3])
-        problem.bind(kernel, {"sum": (-50.0, 0.5)}, "dale", x=both, **problem.given("shift", "width"))
+        moved = point.plus(np.full((4, 1), MOVED))
+        both, limits = (moved.take([0, 1, 2]), moved.take([1, 2, 3])), {"sum": (-50.0, 0.5 + 2 * MOVED)}
+        problem.bind(kernel, limits, "dale", x=both, **problem.given("shift", "width"))
         self.solver = Solver(problem)
 
     def solve(self) -> None:
-        parameters = {"shift": 0.3, "width": 1.0, "weight.bend": 100.0, "weight.way": 1.0}
+        parameters = {"shift": 0.3 + MOVED, "width": 1.0, "weight.bend": 100.0, "weight.way": 1.0}
         upper = {"point": np.array([[0.8], [5], [5], [5]])}
         self.solver.solve({"point": START[:, None] + 0.3}, parameters, OPTIONS, {"point": np.array(-5.0)}, upper=upper)
 
@@ -65,7 +67,7 @@ def test_programs_are_recorded_as_they_were_posed(posed: Posed) -> None:
     np.testing.assert_array_equal(posed.start, [*(START + 0.3), 0])
     np.testing.assert_array_equal(posed.lower, [-5, -5, -5, -5, -1])
     np.testing.assert_array_equal(posed.upper, [0.8, 5, 5, 5, 1])
-    np.testing.assert_array_equal(posed.parameters, [0.3, 1, 100, 1])
+    np.testing.assert_array_equal(posed.parameters, [0.3 + MOVED, 1, 100, 1])
     assert posed.options is OPTIONS
 
 
