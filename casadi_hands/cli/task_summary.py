@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -9,7 +10,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from casadi_hands.task import Capsule, Goal, Limits, Task
+from casadi_hands.task import Goal, Limits, Task
 from casadi_hands.task.limits import usual_replay_position
 
 
@@ -55,9 +56,8 @@ def _lines(task: Task) -> Iterator[tuple[str, str]]:
 
 
 def _object(task: Task) -> str:
-    capsules = sum(isinstance(shape, Capsule) for shape in task.object.shapes)
-    kinds = {"capsule": capsules, "sphere": len(task.object.shapes) - capsules}
-    shapes = " and ".join(f"{count} {kind}{'s' * (count > 1)}" for kind, count in kinds.items() if count)
+    kinds = Counter(shape.body.kind for shape in task.object.shapes)
+    shapes = " and ".join(f"{count} {kind}{'s' * (count > 1)}" for kind, count in sorted(kinds.items()))
     return f"{task.object.mass:g} kg; {shapes}, {2e3 * task.object.half_extent:.4g} mm at its longest"
 
 

@@ -7,6 +7,7 @@ is a least-squares fit or a linear programme at each keyframe or sample.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import compress
 
 import casadi as ca
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 from scipy.spatial.transform import Rotation
 
+from casadi_hands.geometry.contact_points import inward_normals
 from casadi_hands.kinematics import finger_kinematics
 from casadi_hands.problem.floating_motion import Floating
 from casadi_hands.problem.model import Model
@@ -58,14 +60,14 @@ def grips(model: Model, floating: Floating, friction: float | None = None) -> tu
         friction: of fingertips and object, in place of the task's; the ground keeps its own.
     """
     mu = np.full(model.contacts, model.friction if friction is None else friction)
-    capsules = model.capsules
     if model.ground is not None:
-        mu, capsules = np.append(mu, model.ground.friction), np.vstack([capsules, model.ground.capsule])
+        mu = np.append(mu, model.ground.friction)
     found = []
     for needed, points, active in zip(
         needed_wrenches(model, floating.pose), floating.point, floating.active, strict=True
     ):
-        forces = spread_forces(points[active], capsules[active], mu[active])
+        normals = inward_normals(points[active], list(compress(model.touched, active)))
+        forces = spread_forces(normals, mu[active])
         wrenches = grasp_map(points[active]) @ forces
         made = wrenches @ nnls(wrenches, needed)[0]
         # Normal forces: every edge has one of unit length.
@@ -147,7 +149,8 @@ def _load(model: Model, design: Result, k: int) -> Load | None:
     )
     contacts = [c for _, c in chosen]
     points = motion.contact_point_object[k, contacts] / model.units.length
-    forces = spread_forces(points, model.capsules[contacts], np.full(len(contacts), model.friction))
+    normals = inward_normals(points, [model.touched[c] for c in contacts])
+    forces = spread_forces(normals, np.full(len(contacts), model.friction))
     wrenches = grasp_map(points) @ forces
     planned = (motion.contact_force[k, contacts] @ turn / model.units.force).reshape(-1)
     needed = grasp_map(points) @ planned

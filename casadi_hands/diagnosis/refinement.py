@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from casadi_hands.diagnosis.moment import moment
+from casadi_hands.diagnosis.own_terms import unmet_bounds
 from casadi_hands.diagnosis.reason import Reason, joints_of
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.units import Units
+from casadi_hands.stages.own_terms import KERNEL
 from casadi_hands.stages.refine.result import Refined
+from casadi_hands.stages.refine.settings import ACCEPTED
 from casadi_hands.terms import constraints as limits
 
 _JOINTS = "more joints (search.max_joints)"
@@ -14,7 +17,7 @@ _JOINTS = "more joints (search.max_joints)"
 
 def failing_fingers(model: Model, refined: Refined) -> set[str]:
     """Names of the fingers that kept a motion from being exact; none if it cannot be laid to fingers."""
-    if refined.met:
+    if refined.met or _misses_own(refined):
         return set()
     if refined.slips_hopelessly:
         most = max(refined.slips.values())
@@ -33,6 +36,8 @@ def refined_reason(model: Model, refined: Refined) -> list[Reason]:
     joints = {
         model.contact_names[c]: f.joints for c, f in zip(refined.hand.contacts, refined.hand.fingers, strict=True)
     }
+    if _misses_own(refined):
+        return list(own_reasons(model, refined))
     if refined.slips_hopelessly:
         most = max(refined.slips, key=lambda name: refined.slips[name])
         slip = 1e3 * refined.slips[most] * model.units.length
@@ -50,6 +55,18 @@ def refined_reason(model: Model, refined: Refined) -> list[Reason]:
         f"{subject} cannot {cannot}{when}{_by(worst.violation, limit.unit, model.units)}"
     )
     return [Reason(what, limit.advice or f"{_JOINTS} or slower goals", frozenset(limit.explains))]
+
+
+def own_reasons(model: Model, refined: Refined) -> tuple[Reason, ...]:
+    """Which bounds of a person's own a refined motion misses."""
+    joints = "+".join(str(finger.joints) for finger in refined.hand.fingers)
+    before = f"no exact motion was found with {joints} joints: it"
+    return unmet_bounds(model, "refine", refined.hand.solution, ACCEPTED, before)
+
+
+def _misses_own(refined: Refined) -> bool:
+    """Whether a bound of a person's own is what a refined motion misses most."""
+    return not refined.met and refined.worst.constraint.startswith(f"{KERNEL}.")
 
 
 def _by(violation: float, unit: str, units: Units) -> str:

@@ -37,6 +37,7 @@ from casadi_hands.export.markup import (
     number,
     numbers,
 )
+from casadi_hands.geometry.bodies import Solid
 from casadi_hands.problem.inertia import Inertial, link_inertial, palm_inertial
 from casadi_hands.problem.motors import Motor, joint_motors
 
@@ -157,7 +158,8 @@ def _add_object(world: Element, task: Task, hand: Hand, motion: Motion) -> None:
     _add_inertial(body, Inertial(item.mass, np.asarray(item.center_of_mass), np.asarray(item.inertia)))
     for k, shape in enumerate(item.shapes):
         geom = {"name": f"object{k}", "priority": "1", "friction": _friction(task, hand, task.friction)}
-        _add_capsule(body, geom, *shape.segment, shape.radius, OBJECT_COLOR)
+        for solid in shape.body.solids():
+            _add_solid(body, geom, solid, OBJECT_COLOR)
 
 
 def _add_hand(world: Element, task: Task, hand: Hand, motion: Motion, motors: tuple[Motor, ...], moves: bool) -> None:
@@ -218,7 +220,12 @@ def _add_finger(
         )
         _add_inertial(body, link_inertial(link, hand.density))
         tip = np.array([0.0, 0.0, link.length])
-        _add_capsule(body, {"name": name, "friction": friction}, np.zeros(3), tip, link.radius, finger_color(i))
+        _add_solid(
+            body,
+            {"name": name, "friction": friction},
+            Solid("capsule", np.zeros(3), tip, link.radius),
+            finger_color(i),
+        )
         parent, origin = body, tip
 
 
@@ -229,20 +236,13 @@ def _add_inertial(body: Element, inertial: Inertial) -> None:
     SubElement(body, "inertial", pos=numbers(inertial.center), mass=number(inertial.mass), fullinertia=numbers(full))
 
 
-def _add_capsule(
-    body: Element,
-    attributes: dict[str, str],
-    start: np.ndarray,
-    end: np.ndarray,
-    radius: float,
-    color: Color,
-) -> None:
-    """Add a capsule geom, or a sphere where start and end coincide."""
-    attributes = {**attributes, "rgba": numbers((*color, 1.0))}
-    if np.array_equal(start, end):
-        SubElement(body, "geom", attributes, type="sphere", pos=numbers(start), size=number(radius))
+def _add_solid(body: Element, attributes: dict[str, str], solid: Solid, color: Color) -> None:
+    """Add a geom."""
+    attributes = {**attributes, "rgba": numbers((*color, 1.0)), "type": solid.kind, "size": number(solid.radius)}
+    if solid.kind == "sphere":
+        SubElement(body, "geom", attributes, pos=numbers(solid.start))
     else:
-        SubElement(body, "geom", attributes, type="capsule", fromto=numbers((*start, *end)), size=number(radius))
+        SubElement(body, "geom", attributes, fromto=numbers((*solid.start, *solid.end)))
 
 
 def _add_actuators(root: Element, hand: Hand, motors: tuple[Motor, ...]) -> None:

@@ -120,10 +120,10 @@ def _hand(hand: Hand) -> dict[str, Any]:
 
 
 def _shape(shape: Any) -> dict[str, Any]:
-    start, end = shape.segment
-    if np.array_equal(start, end):
-        return {"type": "sphere", "center": start, "radius": shape.radius}
-    return {"type": "capsule", "start": start, "end": end, "radius": shape.radius}
+    given = shape.body.as_mapping()
+    if shape.body.kind == "capsule" and np.array_equal(given["start"], given["end"]):
+        return {"type": "sphere", "center": given["start"], "radius": given["radius"]}
+    return {"type": shape.body.kind, **given}
 
 
 def _goals(task: Task) -> list[dict[str, Any]]:

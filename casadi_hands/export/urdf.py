@@ -19,6 +19,7 @@ from casadi_hands.export.markup import (
     number,
     numbers,
 )
+from casadi_hands.geometry.bodies import Solid
 from casadi_hands.problem.inertia import Inertial, link_inertial, palm_inertial
 
 if TYPE_CHECKING:
@@ -71,7 +72,8 @@ def object_urdf(task: Task) -> str:
     body = task.object
     _add_inertial(link, Inertial(body.mass, np.asarray(body.center_of_mass), np.asarray(body.inertia)))
     for shape in body.shapes:
-        _add_capsule(link, *shape.segment, shape.radius, OBJECT_COLOR, OBJECT_COLOR)
+        for solid in shape.body.solids():
+            _add_solid(link, solid, OBJECT_COLOR, OBJECT_COLOR)
     return document(robot)
 
 
@@ -110,7 +112,8 @@ def _add_finger(robot: Element, hand: Hand, i: int, finger: Finger) -> None:
         )
         body = SubElement(robot, "link", name=name)
         _add_inertial(body, link_inertial(link, hand.density))
-        _add_capsule(body, np.zeros(3), np.array([0.0, 0.0, link.length]), link.radius, finger_color(i), joint_color(i))
+        solid = Solid("capsule", np.zeros(3), np.array([0.0, 0.0, link.length]), link.radius)
+        _add_solid(body, solid, finger_color(i), joint_color(i))
         parent, origin = name, np.array([0.0, 0.0, link.length])
 
 
@@ -134,17 +137,18 @@ def _add_inertial(link: Element, inertial: Inertial) -> None:
     SubElement(element, "inertia", entries)
 
 
-def _add_capsule(
-    link: Element, start: np.ndarray, end: np.ndarray, radius: float, color: Color, end_color: Color
-) -> None:
-    """Add a capsule as cylinder and two spheres, or one sphere where start and end coincide."""
+def _add_solid(link: Element, solid: Solid, color: Color, end_color: Color) -> None:
+    """Add a solid; a capsule as cylinder and two spheres."""
+    start, end, radius = solid.start, solid.end, solid.radius
     axis = end - start
     length = float(np.linalg.norm(axis))
     rotation = (0.0, float(np.arctan2(np.hypot(axis[0], axis[1]), axis[2])), float(np.arctan2(axis[1], axis[0])))
     for role in ("visual", "collision"):
-        _add_shape(link, role, _sphere(radius), start, rotation, end_color)
-        if length > 0.0:
+        if solid.kind != "cylinder":
+            _add_shape(link, role, _sphere(radius), start, rotation, end_color)
+        if solid.kind != "sphere":
             _add_shape(link, role, _cylinder(radius, length), (start + end) / 2, rotation, color)
+        if solid.kind == "capsule":
             _add_shape(link, role, _sphere(radius), end, rotation, end_color)
 
 

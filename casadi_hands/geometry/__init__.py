@@ -1,18 +1,7 @@
-"""Shapes of the method: projection, normal, distance; one code for CasADi numbers (DM) and symbols (SX), or NumPy."""
+"""Shapes of the method: bodies, distances, paths over surfaces; for CasADi's symbols, and for numbers where needed."""
 
-from casadi_hands.geometry.capsule import closest_on_segment, nearest_on_axis, project_to_capsule
 from casadi_hands.geometry.disc import point_disc_distance
 from casadi_hands.geometry.segments import segment_distance
 from casadi_hands.geometry.smooth import clamp, norm, penalty_spline, soft_exponential
 
-__all__ = [
-    "clamp",
-    "closest_on_segment",
-    "nearest_on_axis",
-    "norm",
-    "penalty_spline",
-    "point_disc_distance",
-    "project_to_capsule",
-    "segment_distance",
-    "soft_exponential",
-]
+__all__ = ["clamp", "norm", "penalty_spline", "point_disc_distance", "segment_distance", "soft_exponential"]

@@ -28,3 +28,12 @@ def segment_distance(start: SX, end: SX, other_start: SX, other_end: SX) -> SX:
     t = clamp((b * s + f) / e, 0, 1)
     s = clamp((b * t - c) / a, 0, 1)
     return norm(between + s * along - t * other_along, _ROUNDING)
+
+
+def point_segment_distance(start: SX, end: SX, point: SX) -> SX:
+    """Distance between a segment and a point, all (3,): what `segment_distance` is for a segment of no length."""
+    along, between = end - start, start - point
+    length2 = ca.sumsqr(along)
+    tie = _TIE * length2 + 1e-9
+    share = clamp((tie / 2 - ca.dot(along, between)) / (length2 + tie), 0, 1)
+    return norm(between + share * along, _ROUNDING)

@@ -1,4 +1,4 @@
-"""A capsule's surface where derivatives must be smooth, and directions across it."""
+"""Paths over surfaces, and directions across them."""
 
 from __future__ import annotations
 
@@ -8,23 +8,6 @@ import casadi as ca
 from casadi import SX
 
 from casadi_hands.geometry import norm
-
-_KINK = 1e-3  # smoothing of a capsule's change from cylinder to cap, relative to its length
-
-
-def from_axis(point: SX, start: SX, end: SX) -> SX:
-    """The vector (3,) to a point from the nearest point of a capsule's axis, whose ends are rounded in effect."""
-    along = end - start
-    t = ca.dot(point - start, along) / (ca.sumsqr(along) + 1e-9)
-    t = (ca.sqrt(t**2 + _KINK**2) - ca.sqrt((t - 1) ** 2 + _KINK**2) + 1) / 2
-    return point - start - t * along
-
-
-def smooth_surface(point: SX, start: SX, end: SX, radius: SX) -> tuple[SX, SX]:
-    """Signed distance and outward normal (3,) of a capsule whose kink is rounded; all in one frame."""
-    offset = from_axis(point, start, end)
-    distance = norm(offset, 1e-6)
-    return distance - radius, offset / distance
 
 
 def path_between(points: Sequence[SX], normals: Sequence[SX], rotations: Sequence[SX]) -> SX:

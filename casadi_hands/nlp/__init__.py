@@ -1,5 +1,6 @@
 """Named variables, parameters, terms and constraints, assembled into one IPOPT solver with exact derivatives."""
 
+from casadi_hands.nlp.failure import SolverError
 from casadi_hands.nlp.kernel import Constraint, Kernel, Term, Weight
 from casadi_hands.nlp.layout import Layout, Parameter, Rows
 from casadi_hands.nlp.problem import Problem
@@ -15,6 +16,7 @@ __all__ = [
     "Rows",
     "Solution",
     "Solver",
+    "SolverError",
     "Term",
     "Weight",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -87,14 +87,25 @@ def kernel_functions(kernels: Sequence[Kernel]) -> list[KernelFunctions]:
     symbols = [_symbols(kernel) for kernel in kernels]
     new = {s.content: (kernel.name, s) for kernel, s in zip(kernels, symbols, strict=True) if s.content not in _known}
     sources = [Source(name, s.content, (*_ROLES, "patterns"), s.differentiated) for name, s in new.values()]
-    for content, functions in zip(new, compiled(sources), strict=True):
-        patterns = functions["patterns"]
-        _known[content] = KernelFunctions(
-            **{role: functions[role] for role in _ROLES},
-            jacobian_pattern=patterns.sparsity_out(0),
-            hessian_pattern=patterns.sparsity_out(1),
-        )
+    _known.update((content, _gathered(found)) for content, found in zip(new, compiled(sources), strict=True))
     return [_known[s.content] for s in symbols]
+
+
+def portable_functions(kernels: Sequence[Kernel]) -> list[KernelFunctions]:
+    """The same functions as CasADi's own expressions: slower, but they refer to nothing outside, so can be saved."""
+    symbols = [_symbols(kernel) for kernel in kernels]
+    known = {s.content: _gathered(s.differentiated()) for s in {s.content: s for s in symbols}.values()}
+    return [known[s.content] for s in symbols]
+
+
+def _gathered(functions: Mapping[str, Function]) -> KernelFunctions:
+    """Functions by role, with the patterns that one of them has."""
+    patterns = functions["patterns"]
+    return KernelFunctions(
+        **{role: functions[role] for role in _ROLES},
+        jacobian_pattern=patterns.sparsity_out(0),
+        hessian_pattern=patterns.sparsity_out(1),
+    )
 
 
 def _nonzeros(matrix: SX) -> SX:

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from casadi_hands.nlp.arguments import Argument, arguments_by_name, check_arguments
 from casadi_hands.nlp.assembly import Gathering, Reads, scatter_hessian, scatter_jacobian, together
-from casadi_hands.nlp.derivatives import KernelFunctions, kernel_functions
-from casadi_hands.nlp.kernel import Kernel, Term
+from casadi_hands.nlp.derivatives import KernelFunctions, kernel_functions, portable_functions
+from casadi_hands.nlp.kernel import Constraint, Kernel, Term
 from casadi_hands.nlp.layout import Label, Layout, Parameter, Rows
 
 Vector = NDArray[np.float64]
@@ -67,6 +67,7 @@ class Problem:
         self.parameters = Layout()
         self.constraints = Layout()
         self.constraint_rows: dict[str, NDArray[np.int64]] = {}
+        self.declared_constraints: dict[str, Constraint] = {}
         self.lower: Vector = np.empty(0)
         self.upper: Vector = np.empty(0)
         self.constraint_lower: Vector = np.empty(0)
@@ -181,6 +182,7 @@ class Problem:
         for name, size in sizes.items():
             lower[:, start : start + size], upper[:, start : start + size] = bounds[name]
             self.constraint_rows[f"{block}.{name}"] = rows[:, start : start + size]
+            self.declared_constraints[f"{block}.{name}"] = kernel.declared[name]
             start += size
         self.constraint_lower = np.append(self.constraint_lower, lower.reshape(-1))
         self.constraint_upper = np.append(self.constraint_upper, upper.reshape(-1))
@@ -195,11 +197,16 @@ class Problem:
         """All cost terms as declared, by their names in the problem."""
         return {name: term for bound in self._bound for name, term in bound.kernel.declared_terms.items()}
 
-    def functions(self) -> dict[str, Function]:
-        """For nlpsol ``nlp`` (x, p) -> (f, g), ``grad_f``, ``jac_g`` and ``hess_lag``; ``terms`` -> (f, g, terms)."""
+    def functions(self, portable: bool = False) -> dict[str, Function]:
+        """For nlpsol ``nlp`` (x, p) -> (f, g), ``grad_f``, ``jac_g`` and ``hess_lag``; ``terms`` -> (f, g, terms).
+
+        Args:
+            portable: without machine code, so that they can be saved and loaded where there is nothing but CasADi.
+        """
         x, p = MX.sym("x", self.variables.size), MX.sym("p", self.parameters.size)
         scale, multipliers = MX.sym("lam_f"), MX.sym("lam_g", self.constraints.size)
-        kernels = kernel_functions([bound.kernel for bound in self._bound])
+        differentiate = portable_functions if portable else kernel_functions
+        kernels = differentiate([bound.kernel for bound in self._bound])
         reads = Reads([(bound.selector, bound.offset) for bound in self._bound], self.variables.size)
         z = reads.of(x)
         bindings = zip(self._bound, kernels, reads.positions, strict=True)

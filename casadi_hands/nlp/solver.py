@@ -1,13 +1,15 @@
-"""IPOPT on a problem's functions, with results by name."""
+"""IPOPT on a problem's functions, with results by name; and what was handed to it, on demand."""
 
 from __future__ import annotations
 
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -15,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from casadi_hands.nlp.kernel import Term
 from casadi_hands.nlp.problem import Problem
+from casadi_hands.nlp.program import Program
 from casadi_hands.nlp.watch import Watch
 
 Vector = NDArray[np.float64]
@@ -97,6 +100,28 @@ class Solution:
         return max(self.violations.values(), default=0.0)
 
 
+class Solve(NamedTuple):
+    """A solve as it was posed, how it was solved, and what came out."""
+
+    program: Program
+    options: Options
+    solution: Solution
+
+
+_kept: ContextVar[list[Solve] | None] = ContextVar("kept", default=None)
+
+
+@contextmanager
+def keep_solves() -> Iterator[list[Solve]]:
+    """Keeps every solve in this thread meanwhile, whichever solver's: what is posed deep within a stage can be had."""
+    solves: list[Solve] = []
+    token = _kept.set(solves)
+    try:
+        yield solves
+    finally:
+        _kept.reset(token)
+
+
 class Solver:
     """A problem with its functions built, ready to be solved from any start with any parameters."""
 
@@ -152,26 +177,45 @@ class Solver:
             KeyError: a name that is not in the problem, or a parameter left out.
             KeyboardInterrupt: the solve was interrupted.
         """
-        problem, p = self.problem, self._parameters(parameters)
+        program = self.program(start, parameters, lower, upper, constraints)
         options = options or Options()
         solver = self.nlpsol(options)
+        watch = self._watches.get(options)
+        if watch:
+            watch.interrupted = False
+        started = time.perf_counter()
+        answer = solver(**program.numbers)
+        seconds = time.perf_counter() - started
+        stats = solver.stats()
+        if stats["return_status"] == "NonIpopt_Exception_Thrown" or (watch and watch.interrupted):
+            # CasADi turns an interrupt into this status, or into an end that was asked for, and goes on.
+            raise KeyboardInterrupt
+        solution = self._solution(answer, program, stats, seconds)
+        if (kept := _kept.get()) is not None:
+            kept.append(Solve(program, options, solution))
+        return solution
+
+    def program(
+        self,
+        start: Mapping[str, ArrayLike],
+        parameters: Mapping[str, ArrayLike],
+        lower: Mapping[str, ArrayLike] | None = None,
+        upper: Mapping[str, ArrayLike] | None = None,
+        constraints: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
+    ) -> Program:
+        """What `solve` hands to IPOPT for the same arguments.
+
+        Raises:
+            KeyError: as `solve`.
+        """
+        problem, p = self.problem, self._parameters(parameters)
         lbx = problem.variables.pack(lower or {}, problem.lower)
         ubx = problem.variables.pack(upper or {}, problem.upper)
         x0 = np.clip(problem.variables.pack(start, np.zeros(problem.variables.size)), lbx, ubx)
         lbg, ubg = problem.constraint_lower.copy(), problem.constraint_upper.copy()
         for name, (low, high) in (constraints or {}).items():
             lbg[problem.constraint_rows[name]], ubg[problem.constraint_rows[name]] = low, high
-        watch = self._watches.get(options)
-        if watch:
-            watch.interrupted = False
-        started = time.perf_counter()
-        answer = solver(x0=x0, p=p, lbx=lbx, ubx=ubx, lbg=lbg, ubg=ubg)
-        seconds = time.perf_counter() - started
-        stats = solver.stats()
-        if stats["return_status"] == "NonIpopt_Exception_Thrown" or (watch and watch.interrupted):
-            # CasADi turns an interrupt into this status, or into an end that was asked for, and goes on.
-            raise KeyboardInterrupt
-        return self._solution(answer, p, (lbg, ubg), stats, seconds)
+        return Program(problem, x0, p, lbx, ubx, lbg, ubg)
 
     def evaluate(self, values: Mapping[str, ArrayLike], parameters: Mapping[str, ArrayLike]) -> dict[str, float]:
         """The weighted value of every term at given variables; those left out are zero.
@@ -199,14 +243,12 @@ class Solver:
             raise KeyError(f"parameters without a value: {', '.join(missing)}")
         return layout.pack(given, np.zeros(layout.size))
 
-    def _solution(
-        self, answer: dict[str, Any], p: Vector, bounds: tuple[Vector, Vector], stats: dict[str, Any], seconds: float
-    ) -> Solution:
+    def _solution(self, answer: dict[str, Any], program: Program, stats: dict[str, Any], seconds: float) -> Solution:
         problem, x = self.problem, np.asarray(answer["x"]).reshape(-1)
         # IPOPT's own f and g are left as they were where it stops before it evaluates them.
-        f, g, terms = (np.array(value).reshape(-1) for value in self.functions["terms"](x, p))
+        f, g, terms = (np.array(value).reshape(-1) for value in self.functions["terms"](x, program.p))
         finite = np.isfinite(g)
-        low, high = (bound - np.where(finite, g, 0.0) for bound in bounds)
+        low, high = (bound - np.where(finite, g, 0.0) for bound in (program.lbg, program.ubg))
         beyond = np.where(finite, np.maximum(np.maximum(low, -high), 0.0), np.inf)
         terms[~np.isfinite(terms)] = np.inf
         return Solution(

@@ -10,10 +10,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from casadi_hands.diagnosis.reason import Reason
 from casadi_hands.export.design import Design
-from casadi_hands.nlp import Solution
+from casadi_hands.nlp import Solution, SolverError
 from casadi_hands.task import Task
 from casadi_hands.terms.catalogue import single
+from casadi_hands.terms.own import OwnTerm
 
 STAGES = ("floating", "synthesis", "whole_hand", "refine")
 
@@ -47,13 +49,21 @@ class Record:
         task: as solved.
         out: folder that is written on ``keep``, or None.
         report: told what is being done.
+        own_terms: costs and constraints that a person adds to those of the stages.
     """
 
-    def __init__(self, task: Task, out: Path | None, report: Callable[[Progress], None]) -> None:
-        self.task, self.out, self.report = task, out, report
+    def __init__(
+        self,
+        task: Task,
+        out: Path | None,
+        report: Callable[[Progress], None],
+        own_terms: tuple[OwnTerm, ...] = (),
+    ) -> None:
+        self.task, self.out, self.report, self.own_terms = task, out, report, own_terms
         self.started = time.perf_counter()
         self.design = Design(task=task, status="failed", reason="nothing has been computed yet")
         self._best: tuple[tuple[float, ...], Design] | None = None
+        self._unmet: dict[str, tuple[Reason, ...]] = {}
 
     def say(self, stage: str, text: str) -> None:
         """Report progress."""
@@ -85,6 +95,19 @@ class Record:
             costs[name] = {"weight": float(single(weights[term.weighs_as or term.name])), "value": value}
         self.update(costs={**self.design.costs, stage: costs})
 
+    def set_unmet(self, stage: str, reasons: tuple[Reason, ...]) -> None:
+        """Keep which bounds of a person's own a stage's last solution misses."""
+        self._unmet[stage] = reasons
+
+    def held_to_bounds(self, design: Design) -> Design:
+        """The design, told which bounds of a person's own were missed on the way to it; certified it is not then."""
+        reasons = [reason.text for missed in self._unmet.values() for reason in missed]
+        untold = [text for text in reasons if text not in design.reason]
+        if not untold:
+            return design
+        status = "feasible" if design.status == "certified" else design.status
+        return replace(design, status=status, reason=". ".join([*untold, *([design.reason] if design.reason else [])]))
+
     def complete(self, design: Design) -> Design:
         """An earlier design with all runs and all time spent until now."""
         seconds = {**self.design.seconds, "total": time.perf_counter() - self.started}
@@ -113,11 +136,11 @@ class Record:
         if self._best is None:
             self.keep(replace(self.design, reason=reason))
 
-    def broken_off(self, error: Exception) -> Design:
+    def broken_off(self, error: SolverError) -> Design:
         """The best design so far or, where none was judged, the failed one that there is."""
         if self._best is not None:
             return self._best[1]
-        why = f"the solve broke off: {str(error) or type(error).__name__}; another seed may not"
+        why = f"the solve broke off: {error}; another seed may not"
         return replace(self.design, status="failed", reason=why)
 
     def keep(self, design: Design) -> Design:

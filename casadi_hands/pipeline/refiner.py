@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from casadi_hands.diagnosis.reason import Reason
-from casadi_hands.diagnosis.refinement import refined_reason
+from casadi_hands.diagnosis.refinement import own_reasons, refined_reason
 from casadi_hands.export.design import Design
 from casadi_hands.pipeline.judge import Judge
 from casadi_hands.pipeline.record import Record, rank_of
@@ -163,7 +163,9 @@ class Refiner:
         self.record.set_costs("refine", refined.hand.solution, refined.weights)
         adopt(self.record, model, refined.hand)
         causes = [*short, *refined_reason(model, refined)]
-        design = self.judge.judge(self.record.design, causes, None if refined.exact else planned)
+        self.record.set_unmet("refine", own_reasons(model, refined))
+        judged = self.judge.judge(self.record.design, causes, None if refined.exact else planned)
+        design = self.record.held_to_bounds(judged)
         self.record.offer(design)
         return design
 

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from concurrent.futures import Executor
+from dataclasses import replace
+from typing import Any
 
+from casadi_hands.diagnosis.own_terms import unmet_bounds
 from casadi_hands.export.commands import commanded
 from casadi_hands.pipeline.record import Record
 from casadi_hands.problem.floating_motion import Floating
@@ -13,6 +16,7 @@ from casadi_hands.problem.model import Model
 from casadi_hands.problem.outcome import floating_motion, whole_hand_motion
 from casadi_hands.problem.si import hand_of, joint_loads
 from casadi_hands.stages.floating.stage import FloatingStage, solve_floating
+from casadi_hands.stages.own_terms import own_weights
 from casadi_hands.stages.synthesis.algorithm import Candidate, Found, Search, run_record
 from casadi_hands.stages.synthesis.target import target_of
 from casadi_hands.stages.whole_hand.stage import WholeHandStage
@@ -20,11 +24,12 @@ from casadi_hands.stages.whole_hand.stage import WholeHandStage
 
 def run_floating(record: Record, model: Model) -> Floating:
     """Stage 1."""
-    task = record.task
+    weights = _weights(record, model, "floating")
     with record.stage("floating", f"object's motion with {model.contacts} floating contacts"):
-        result = solve_floating(model, dict(task.weights.floating))
+        result = solve_floating(model, weights)
     _add_floating_runs(record, result)
-    record.set_costs("floating", result.solution, dict(task.weights.floating))
+    record.set_costs("floating", result.solution, weights)
+    record.set_unmet("floating", unmet_bounds(result.model, "floating", result.solution))
     record.update(motion=floating_motion(result.model, result))
     record.keep_unfinished("stopped before a hand was designed")
     return result
@@ -33,7 +38,7 @@ def run_floating(record: Record, model: Model) -> Floating:
 def run_shortened(record: Record, model: Model, whole: Floating) -> Floating:
     """Stage 1 over a share of the way to the goals, with the contacts that act over the whole of it."""
     with record.stage("floating", "object's motion over a part of the way, which fingers can surely go with it"):
-        result = FloatingStage(model).solve_as(whole, dict(record.task.weights.floating))
+        result = FloatingStage(model).solve_as(whole, _weights(record, model, "floating"))
     _add_floating_runs(record, result)
     return result
 
@@ -47,7 +52,8 @@ def prepare_search(record: Record, model: Model, floating: Floating, executor: E
     """Algorithm 1 with the task's settings, for a floating motion."""
     settings = record.task.search
     return Search(
-        target_of(model, floating),
+        # Other processes get all that trials read, which a person's own terms are not of.
+        target_of(replace(model, own_terms=()), floating),
         dict(record.task.weights.synthesis),
         trials=settings.trials,
         recombinations=settings.recombinations,
@@ -75,14 +81,21 @@ def run_search(record: Record, model: Model, search: Search, least: Mapping[int,
 def run_whole_hand(record: Record, model: Model, floating: Floating, candidate: Candidate) -> WholeHand:
     """Stage 3."""
     task, joints = record.task, "+".join(map(str, candidate.joints))
+    weights = _weights(record, model, "whole_hand")
     with record.stage("whole_hand", f"object and hand of {joints} joints together"):
         stage = WholeHandStage(model, candidate.hand.contacts, candidate.joints, task.palm.may_move)
-        result = stage.solve(floating, candidate.hand.fingers, dict(task.weights.whole_hand))
+        result = stage.solve(floating, candidate.hand.fingers, weights)
     record.add_runs([run_record("whole_hand", "hand", task.search.seed, "", result.solution)])
-    record.set_costs("whole_hand", result.solution, dict(task.weights.whole_hand))
+    record.set_costs("whole_hand", result.solution, weights)
+    record.set_unmet("whole_hand", unmet_bounds(model, "whole_hand", result.solution))
     adopt(record, model, result)
     record.keep_unfinished("stopped before the motion was refined")
     return result
+
+
+def _weights(record: Record, model: Model, stage: str) -> dict[str, Any]:
+    """The task's weights of a stage, and those of a person's own terms."""
+    return dict(getattr(record.task.weights, stage)) | own_weights(model, stage)
 
 
 def adopt(record: Record, model: Model, result: WholeHand) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from casadi_hands.errors import SolveError
 from casadi_hands.export.design import Design
-from casadi_hands.geometry.contact_points import inward_normals, on_capsules
+from casadi_hands.geometry.contact_points import inward_normals, on_bodies
 from casadi_hands.kinematics import STAND, finger_kinematics
 from casadi_hands.kinematics.morphology import FingerSeed
 from casadi_hands.motion import eased, linear
@@ -87,7 +87,7 @@ def kept_margin(earlier: Design) -> Margin:
         bearing = active & np.append(active[:1], active[:-1])
         asked = eased_in(bearing, model.schedule.samples)
         points, force = whole.point[bearing, c], whole.force[bearing, c]
-        inward = inward_normals(points, np.tile(model.capsules[c], (len(points), 1)))
+        inward = inward_normals(points, [model.touched[c]] * len(points))
         normal = (force * inward).sum(axis=1)
         across = np.linalg.norm(force - normal[:, None] * inward, axis=1)
         grip = min(grip, float((normal / asked[bearing]).min()))
@@ -164,12 +164,11 @@ def _moved_palm(was: WholeHand, old: Model, model: Model) -> tuple[Array, Array]
 def _moved_points(points: Array, old: Model, model: Model) -> Array:
     """Contact points (S, C, 3) moved by what the task's contacts moved, on the object's surface as it is now."""
     before = old.patches[[old.contact_names.index(name) for name in model.contact_names]]
-    patches, capsules = model.patches, model.capsules
+    patches = model.patches
     if model.ground is not None and old.ground is not None:
         patches, before = np.vstack([patches, model.ground.patch]), np.vstack([before, old.ground.patch])
-        capsules = np.vstack([capsules, model.ground.capsule])
     moved = points + patches - before * (old.units.length / model.units.length)
-    return np.array([on_capsules(p, capsules) for p in moved])
+    return np.array([on_bodies(p, model.touched) for p in moved])
 
 
 def _followed(

@@ -8,9 +8,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from casadi_hands.geometry.bodies import Body
 from casadi_hands.motion import Schedule, held
 from casadi_hands.problem.palm_path import PalmPath
 from casadi_hands.problem.units import Units
+from casadi_hands.terms.own import OwnTerm
 
 Array = NDArray[np.float64]
 _NO_GROUND = -1e3  # half extents
@@ -18,12 +20,19 @@ _NO_GROUND = -1e3  # half extents
 
 @dataclass(frozen=True)
 class Ground:
-    """A horizontal plane; ``patch`` is where on the object it may touch, (3,) object frame."""
+    """A horizontal plane.
+
+    Attributes:
+        height: of the plane.
+        friction: of plane and object.
+        patch: where on the object it may touch, (3,) object frame.
+        body: index of the object's body that it touches.
+    """
 
     height: float
     friction: float
     patch: Array
-    capsule: Array
+    body: int
 
 
 @dataclass(frozen=True)
@@ -48,10 +57,10 @@ class Model:
         schedule: keyframes and samples, s.
         gravity: (3,) weight in m·g.
         inertia: (3, 3) object frame, in m·length².
-        primitives: (K, 7) start, end, radius of the object's capsules, object frame.
+        bodies: whose union the object is, object frame.
         contact_names: of the C contacts.
         patches: (C, 3) the user's contact points, object frame.
-        capsules: (C, 7) the primitive each contact lies on.
+        contact_bodies: (C,) index of the body that each contact lies on.
         friction: of fingertip and object.
         ground: or None.
         palm_radius: of the disc.
@@ -73,16 +82,17 @@ class Model:
         torque_limit: of a joint in m·g·length, or inf.
         speed_limit: of a joint in rad/s, or inf.
         regrasp: planned, or None where fingers stay where they touch.
+        own_terms: costs and constraints that a person adds to those of the stages.
     """
 
     units: Units
     schedule: Schedule
     gravity: Array
     inertia: Array
-    primitives: Array
+    bodies: tuple[Body, ...]
     contact_names: tuple[str, ...]
     patches: Array
-    capsules: Array
+    contact_bodies: tuple[int, ...]
     friction: float
     ground: Ground | None
     palm_radius: float
@@ -104,6 +114,7 @@ class Model:
     torque_limit: float
     speed_limit: float
     regrasp: Regrasp | None = None
+    own_terms: tuple[OwnTerm, ...] = ()
 
     @property
     def contacts(self) -> int:
@@ -111,12 +122,32 @@ class Model:
         return len(self.contact_names)
 
     @property
+    def kinds(self) -> tuple[type[Body], ...]:
+        """What the bodies are; with their parameters it is all that a kernel must know of them."""
+        return tuple(type(body) for body in self.bodies)
+
+    @property
+    def touched(self) -> tuple[Body, ...]:
+        """The body that each contact lies on, the ground's contact, if any, last."""
+        chosen = [*self.contact_bodies, *([] if self.ground is None else [self.ground.body])]
+        return tuple(self.bodies[body] for body in chosen)
+
+    @property
+    def frictions(self) -> Array:
+        """Friction of each contact, the ground's, if any, last."""
+        return np.append(np.full(self.contacts, self.friction), [] if self.ground is None else [self.ground.friction])
+
+    @property
+    def all_patches(self) -> Array:
+        """Where contacts are wanted, the ground's, if any, last; (C, 3) object frame."""
+        return self.patches if self.ground is None else np.vstack([self.patches, self.ground.patch])
+
+    @property
     def keyframe_patches(self) -> Array:
         """(N, C, 3) where contacts are wanted at the keyframes, object frame; the ground's, if any, last."""
         if self.regrasp is not None:
             return self.regrasp.patches
-        patches = self.patches if self.ground is None else np.vstack([self.patches, self.ground.patch])
-        return np.tile(patches, (len(self.schedule.keyframes), 1, 1))
+        return np.tile(self.all_patches, (len(self.schedule.keyframes), 1, 1))
 
     @property
     def ground_height(self) -> float:

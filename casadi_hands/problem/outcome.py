@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from casadi_hands.geometry.contact_points import on_capsules
+from casadi_hands.geometry.bodies.capsule import Capsule
+from casadi_hands.geometry.contact_points import on_bodies
 from casadi_hands.kinematics.numeric import link_frames
 from casadi_hands.problem.floating_motion import Floating
 from casadi_hands.problem.hand_motion import WholeHand
@@ -45,17 +46,16 @@ def whole_hand_motion(model: Model, result: WholeHand) -> Motion:
     """
     count = len(result.force)
     names = model.contact_names + (("ground",) if model.ground is not None else ())
-    capsules = model.capsules if model.ground is None else np.vstack([model.capsules, model.ground.capsule])
-    point = np.array([on_capsules(p, capsules) for p in result.point])
+    point = np.array([on_bodies(p, model.touched) for p in result.point])
     on_link = np.zeros_like(point)
     links = ["none"] * model.contacts + (["ground"] if model.ground is not None else [])
     for i, (finger, contact) in enumerate(zip(result.fingers, result.contacts, strict=True)):
         links[contact] = f"finger{i}_link{finger.joints - 1}"
-        tip = np.array([*np.zeros(3), 0, 0, finger.lengths[-1], model.link_radius])
+        link = Capsule(np.zeros(3), np.array([0, 0, finger.lengths[-1]]), model.link_radius)
         origins, rotations = link_frames(finger, model.link_radius, result.angles[i])
         from_origin = in_palm(model, result, point[:, contact]) - origins[:, -1]
         local = np.einsum("sji,sj->si", rotations[:, -1], from_origin)
-        on_link[:, contact] = on_capsules(local, np.tile(tip, (count, 1)))
+        on_link[:, contact] = on_bodies(local, [link] * count)
     if model.ground is not None:
         on_link[:, -1] = in_world(model, result, point[:, -1])
         on_link[:, -1, 2] = model.ground.height

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from casadi_hands.geometry.contact_points import on_capsules
+from casadi_hands.geometry.contact_points import on_bodies
 from casadi_hands.motion import Schedule, catmull_rom, continuous, held, linear, nearest_exponential
 from casadi_hands.problem.hand_motion import WholeHand, turned
 from casadi_hands.problem.model import Model
@@ -115,15 +115,13 @@ def extrapolated(model: Model, first: WholeHand, second: WholeHand, by: float) -
     def beyond(a: Array, b: Array) -> Array:
         return b + by * (b - a)
 
-    points, capsules = beyond(first.point, second.point), model.capsules
-    if model.ground is not None:
-        capsules = np.vstack([capsules, model.ground.capsule])
+    points = beyond(first.point, second.point)
     return replace(
         second,
         angles=tuple(beyond(a, b) for a, b in zip(first.angles, second.angles, strict=True)),
         position=beyond(first.position, second.position),
         vector=beyond(first.vector, second.vector),
-        point=np.array([on_capsules(p, capsules) for p in points]),
+        point=np.array([on_bodies(p, model.touched) for p in points]),
     )
 
 

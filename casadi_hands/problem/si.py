@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from casadi_hands.geometry import nearest_on_axis
+from casadi_hands.geometry.bodies import Body
 from casadi_hands.kinematics import STAND
 from casadi_hands.kinematics.morphology import FingerSeed, frame_about
 from casadi_hands.motion import Schedule, continuous
@@ -43,7 +43,7 @@ def build_model(task: Task) -> Model:
     times, places, turns = zip(*task.palm.waypoints, strict=True)
     goal_times = [goal.at for goal in task.motion]
     schedule = Schedule.of(goal_times, task.duration, task.keyframes_between, task.time_step, times)
-    primitives = np.array([[*np.ravel(s.segment), s.radius] for s in task.object.shapes]) / length
+    bodies = tuple(type(s.body).of(round_off(s.body.parameters / length)) for s in task.object.shapes)
     patches = np.array([finger.touches for finger in task.fingers.values()]) / length
     positions, vectors, reference = _goals(task)
     palm_path = PalmPath(np.array(times), round_off(np.array(places) / length), np.array(turns))
@@ -52,9 +52,8 @@ def build_model(task: Task) -> Model:
     ground = None
     if task.ground is not None:
         patch = np.asarray(task.ground.touches, float) / length
-        capsule = _nearest_primitive(patch, primitives)
         height = round_off(task.ground.height / length)
-        ground = Ground(height, task.ground.friction, round_off(patch), round_off(capsule))
+        ground = Ground(height, task.ground.friction, round_off(patch), _nearest_body(patch, bodies))
     actuator = task.actuator
     low, high = task.hand.joint_limits
     return Model(
@@ -62,10 +61,10 @@ def build_model(task: Task) -> Model:
         schedule=schedule,
         gravity=round_off(np.asarray(task.gravity) / acceleration),
         inertia=round_off(np.asarray(task.object.inertia) / (task.object.mass * length**2)),
-        primitives=round_off(primitives),
+        bodies=bodies,
         contact_names=tuple(task.fingers),
         patches=round_off(patches),
-        capsules=round_off(np.array([_nearest_primitive(p, primitives) for p in patches])),
+        contact_bodies=tuple(_nearest_body(p, bodies) for p in patches),
         friction=task.friction,
         ground=ground,
         palm_radius=round_off(task.palm.radius / length),
@@ -92,13 +91,9 @@ def build_model(task: Task) -> Model:
     )
 
 
-def _nearest_primitive(point: Array, primitives: Array) -> Array:
-    """The primitive (7,) whose surface is nearest to a point."""
-
-    def distance(primitive: Array) -> float:
-        return abs(float(np.linalg.norm(nearest_on_axis(point, primitive)[1])) - float(primitive[6]))
-
-    return np.asarray(min(primitives, key=distance))
+def _nearest_body(point: Array, bodies: Sequence[Body]) -> int:
+    """Index of the body whose surface is nearest to a point (3,)."""
+    return int(np.argmin([abs(body.signed_distance(point)) for body in bodies]))
 
 
 def _goals(task: Task) -> tuple[Array, Array, Array]:

@@ -6,8 +6,6 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from casadi_hands.geometry.contact_points import inward_normals
-
 Array = NDArray[np.float64]
 EDGES = 8  # of a linearised friction cone
 
@@ -28,9 +26,9 @@ def friction_edges(normals: Array, friction: Array) -> Array:
     return edges
 
 
-def spread_forces(points: Array, capsules: Array, friction: Array) -> Array:
-    """(3C, 8C): contact forces one above the other for each edge of the friction cones."""
-    edges = friction_edges(inward_normals(points, capsules), friction)
-    count = edges.shape[1] // len(points)
-    mask = np.kron(np.eye(len(points)), np.ones((3, count)))
-    return np.asarray(np.tile(edges, (len(points), 1)) * mask)
+def spread_forces(normals: Array, friction: Array) -> Array:
+    """(3C, 8C): contact forces one above the other for each edge of the friction cones about normals (C, 3)."""
+    edges = friction_edges(normals, friction)
+    count = edges.shape[1] // len(normals)
+    mask = np.kron(np.eye(len(normals)), np.ones((3, count)))
+    return np.asarray(np.tile(edges, (len(normals), 1)) * mask)

@@ -126,7 +126,7 @@ def _object_points(task: Task) -> Iterator[Problem]:
         allowed = "a point within the box around the object's shapes"
         yield Problem(("object", "center_of_mass"), str(list(body.center_of_mass)), allowed)
     if task.tool is not None:
-        distance = min(shape.signed_distance(np.array(task.tool)) for shape in body.shapes)
+        distance = min(shape.body.signed_distance(np.array(task.tool)) for shape in body.shapes)
         if distance > body.half_extent:
             allowed = f"a point within {body.half_extent:.3g} m of the object; this one is {distance:.3g} m from it"
             yield Problem(("tool",), str(list(task.tool)), allowed)

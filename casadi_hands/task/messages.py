@@ -9,8 +9,10 @@ from typing import Any
 from pydantic_core import ErrorDetails
 
 from casadi_hands.task.problem import Problem
+from casadi_hands.task.shapes import SECTIONS
 from casadi_hands.task.structure import description_at, names_at, paths_of
 
+_KINDS = " or ".join(f"{name}: {{{{{', '.join(section.model_fields)}}}}}" for name, section in SECTIONS.items())
 _ALLOWED = {
     "float_type": "a number (without quotes or unit; lengths in m, times in s, masses in kg)",
     "finite_number": "a finite number",
@@ -25,8 +27,8 @@ _ALLOWED = {
     "tuple_type": "a list",
     "model_type": "a mapping with the fields {names}",
     "dict_type": "a mapping of names, such as thumb: {{touches: [0, 0.02, 0]}}",
-    "union_tag_invalid": "sphere: {{center, radius}} or capsule: {{start, end, radius}}",
-    "union_tag_not_found": "sphere: {{center, radius}} or capsule: {{start, end, radius}}",
+    "union_tag_invalid": _KINDS,
+    "union_tag_not_found": _KINDS,
     "refused": "{allowed}",
 }
 

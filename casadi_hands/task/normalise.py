@@ -39,7 +39,7 @@ def normalise(task: Task) -> tuple[Task, list[Problem]]:
 def _snap(point: Vector, body: ManipulatedObject, path: tuple[str, ...], problems: list[Problem]) -> Vector:
     """Nearest point of the surface of the nearest primitive, (3,) m; a problem if that is no contact."""
     start = np.array(point)
-    distances = [abs(shape.signed_distance(start)) for shape in body.shapes]
+    distances = [abs(shape.body.signed_distance(start)) for shape in body.shapes]
     nearest = int(np.argmin(distances))
     shape, distance = body.shapes[nearest], distances[nearest]
     given, tolerance = f"{list(point)}", CONTACT_TOLERANCE * body.half_extent
@@ -47,17 +47,12 @@ def _snap(point: Vector, body: ManipulatedObject, path: tuple[str, ...], problem
         allowed = f"a point within {tolerance:.3g} m of the object's surface; this one is {distance:.3g} m from it"
         problems.append(Problem(path, given, allowed))
         return point
-    out = start - shape.nearest_on_axis(start)
-    if np.linalg.norm(out) < 1e-6 * shape.radius:
+    if not shape.body.has_normal(start):
         problems.append(Problem(path, given, "a point off the axis of its primitive, so that one side is nearest"))
         return point
-    snapped = (
-        start
-        if distance <= _ROUNDING * body.half_extent
-        else (shape.nearest_on_axis(start) + shape.radius * out / np.linalg.norm(out))
-    )
+    snapped = start if distance <= _ROUNDING * body.half_extent else shape.body.on_surface(start)
     for number, other in enumerate(body.shapes):
-        if other is not shape and other.signed_distance(snapped) < -1e-6 * body.half_extent:
+        if other is not shape and other.body.signed_distance(snapped) < -1e-6 * body.half_extent:
             allowed = f"a point on the outside of the object; this one lies inside object.shapes[{number}]"
             problems.append(Problem(path, given, allowed))
             return point

@@ -8,26 +8,28 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from casadi_hands.task.fields import Matrix, Positive, Section, Vector, refuse, vector
-from casadi_hands.task.shapes import Capsule, Shape, Sphere
+from casadi_hands.task.shapes import SECTIONS, Primitive, Shape
+
+_KINDS = " and ".join(f"`{name}: {{{', '.join(each.model_fields)}}}`" for name, each in SECTIONS.items())
 
 
-def _shares(shapes: tuple[Sphere | Capsule, ...]) -> np.ndarray:
-    volumes = np.array([shape.volume for shape in shapes])
+def _shares(shapes: tuple[Primitive, ...]) -> np.ndarray:
+    volumes = np.array([shape.body.volume for shape in shapes])
     shares: np.ndarray = volumes / volumes.sum()
     return shares
 
 
 def _uniform_center(data: dict[str, Any]) -> Vector:
     shapes = data["shapes"]
-    return vector(_shares(shapes) @ np.array([shape.centroid for shape in shapes]))
+    return vector(_shares(shapes) @ np.array([shape.body.centroid for shape in shapes]))
 
 
 def _uniform_inertia(data: dict[str, Any]) -> Matrix:
     shapes, center = data["shapes"], np.array(_uniform_center(data))
     inertia = np.zeros((3, 3))
     for share, shape in zip(_shares(shapes), shapes, strict=True):
-        arm = shape.centroid - center
-        inertia += share * (shape.unit_inertia + (arm @ arm) * np.eye(3) - np.outer(arm, arm))
+        arm = shape.body.centroid - center
+        inertia += share * (shape.body.unit_inertia + (arm @ arm) * np.eye(3) - np.outer(arm, arm))
     x, y, z = data["mass"] * inertia
     return vector(x), vector(y), vector(z)
 
@@ -41,8 +43,7 @@ class ManipulatedObject(Section):
     mass: Positive = Field(description="Mass, kg.")
     shapes: tuple[Shape, ...] = Field(
         min_length=1,
-        description="The primitives whose union is the object: a list of `sphere: {center, radius}` and "
-        "`capsule: {start, end, radius}`.",
+        description=f"The primitives whose union is the object: a list of {_KINDS}.",
     )
     center_of_mass: Vector = Field(
         default_factory=_uniform_center,
@@ -79,9 +80,8 @@ class ManipulatedObject(Section):
     @property
     def bounding_box(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper corner of the box around the primitives, (3,) and (3,), m, object frame."""
-        ends = np.array([(np.array(shape.segment)) for shape in self.shapes])
-        radii = np.array([shape.radius for shape in self.shapes])[:, None, None]
-        return (ends - radii).min(axis=(0, 1)), (ends + radii).max(axis=(0, 1))
+        lower, upper = (np.array(corners) for corners in zip(*[s.body.bounding_box for s in self.shapes], strict=True))
+        return lower.min(axis=0), upper.max(axis=0)
 
     def lowest_point(self, rotation: np.ndarray) -> np.ndarray:
         """Point of the surface that is lowest with the object turned by ``rotation``.
@@ -90,10 +90,10 @@ class ManipulatedObject(Section):
             rotation: (3, 3) world <- object.
 
         Returns:
-            (3,) m, object frame; the middle of the lowest line when a capsule lies level.
+            (3,) m, object frame; the middle of the lowest line or face when one lies level.
         """
         down = rotation.T @ np.array([0.0, 0.0, -1.0])
-        points = np.array([end + shape.radius * down for shape in self.shapes for end in shape.segment])
+        points = np.vstack([s.body.support(down) + s.body.ball * down for s in self.shapes])
         depths = points @ down
         lowest = points[depths >= depths.max() - 1e-9 * self.half_extent]
         middle: np.ndarray = lowest.mean(axis=0)

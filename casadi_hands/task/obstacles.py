@@ -58,9 +58,10 @@ def depth_in_palm(body: ManipulatedObject, position: np.ndarray, vector: np.ndar
     rotation = rotation_matrix(vector)
     depths = []
     for shape in body.shapes:
-        start, end = (to_palm @ (position + rotation @ p - np.array(palm.position)) for p in shape.segment)
-        depths.append(shape.radius - _least(distance, start, end))
-    return max(depths)
+        for edge in shape.body.edges():
+            start, end = (to_palm @ (position + rotation @ p - np.array(palm.position)) for p in edge)
+            depths.append(shape.body.ball - _least(distance, start, end))
+    return float(max(depths))
 
 
 def _least(function: Callable[[np.ndarray], float], start: np.ndarray, end: np.ndarray) -> float:

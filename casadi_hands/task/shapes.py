@@ -1,114 +1,66 @@
-"""The primitives an object is made of, and their solid and surface geometry."""
+"""The primitives an object is made of, as a task file gives them; what they are is said in `geometry.bodies`."""
 
 from __future__ import annotations
 
+from dataclasses import fields
+from functools import cached_property, reduce
+from operator import or_
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BeforeValidator, Discriminator, Field, SerializerFunctionWrapHandler, Tag, model_serializer
+from pydantic import (
+    BeforeValidator,
+    Discriminator,
+    Field,
+    SerializerFunctionWrapHandler,
+    Tag,
+    create_model,
+    model_serializer,
+)
 
+from casadi_hands.geometry.bodies import KINDS, Body
 from casadi_hands.task.fields import Positive, Section, Vector, vector
 
 
-class _Primitive(Section):
-    """A segment with a radius; a sphere's segment has no length."""
+class Primitive(Section):
+    """A primitive of the object; its class names the shape."""
 
-    radius: Positive = Field(description="Radius, m.")
-
-    @property
-    def segment(self) -> tuple[np.ndarray, np.ndarray]:
-        """Ends of the axis, (3,) and (3,), m, object frame."""
-        raise NotImplementedError
-
-    @property
-    def _length(self) -> float:
-        start, end = self.segment
-        return float(np.linalg.norm(end - start))
-
-    @property
-    def volume(self) -> float:
-        """Volume, m³."""
-        return float(np.pi * self.radius**2 * (self._length + 4 / 3 * self.radius))
-
-    @property
-    def centroid(self) -> np.ndarray:
-        """Centre of the solid, (3,), m, object frame."""
-        start, end = self.segment
-        center: np.ndarray = (start + end) / 2
-        return center
-
-    @property
-    def unit_inertia(self) -> np.ndarray:
-        """Inertia of the solid with a mass of 1 kg about its centroid, (3, 3), m², object frame."""
-        radius, length = self.radius, self._length
-        cylinder = length / (length + 4 / 3 * radius)
-        caps = 1 - cylinder
-        along = cylinder * radius**2 / 2 + caps * 2 / 5 * radius**2
-        # Each half sphere has its centre of mass 3/8 r beyond the end of the axis.
-        across = cylinder * (radius**2 / 4 + length**2 / 12)
-        across += caps * (2 / 5 * radius**2 + length**2 / 4 + 3 / 8 * radius * length)
-        if length == 0:
-            return across * np.eye(3)
-        start, end = self.segment
-        axis = (end - start) / length
-        return across * np.eye(3) + (along - across) * np.outer(axis, axis)
-
-    def nearest_on_axis(self, point: np.ndarray) -> np.ndarray:
-        """Point of the axis nearest to ``point``; both (3,), m, object frame."""
-        start, end = self.segment
-        along = end - start
-        if not along.any():
-            return start
-        share = np.clip((point - start) @ along / (along @ along), 0.0, 1.0)
-        nearest: np.ndarray = start + share * along
-        return nearest
-
-    def signed_distance(self, point: np.ndarray) -> float:
-        """Distance from the surface to ``point`` (3,), m; negative inside."""
-        return float(np.linalg.norm(point - self.nearest_on_axis(point)) - self.radius)
-
-
-class Sphere(_Primitive):
-    """A ball."""
-
-    center: Vector = Field(description="Centre, m, object frame.")
-
-    @property
-    def segment(self) -> tuple[np.ndarray, np.ndarray]:
-        """The centre, twice: (3,) and (3,), m, object frame."""
-        return np.array(self.center), np.array(self.center)
+    @cached_property
+    def body(self) -> Body:
+        """The body, m, object frame."""
+        kind = KINDS[type(self).__name__.lower()]
+        given = {name: getattr(self, name) for name in type(self).model_fields}
+        return kind(**{name: np.array(v) if isinstance(v, tuple) else v for name, v in given.items()})
 
     @model_serializer(mode="wrap")
     def _tagged(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return {"sphere": handler(self)}
+        return {type(self).__name__.lower(): handler(self)}
 
-    def moved(self, by: np.ndarray) -> Sphere:
-        """The same sphere shifted by ``by`` (3,), m."""
-        return Sphere(center=vector(np.array(self.center) + by), radius=self.radius)
+    def moved(self, by: np.ndarray) -> Primitive:
+        """The same primitive shifted by ``by`` (3,), m."""
+        given = self.body.placed(np.eye(3), by).as_mapping()
+        return type(self)(**{name: vector(v) if isinstance(v, np.ndarray) else v for name, v in given.items()})
 
 
-class Capsule(_Primitive):
-    """A cylinder with half a sphere at each end."""
+_TYPES = {"point": Vector, "positive": Positive}
 
-    start: Vector = Field(description="One end of the axis, m, object frame.")
-    end: Vector = Field(description="The other end, m, object frame; equal ends make a sphere.")
 
-    @property
-    def segment(self) -> tuple[np.ndarray, np.ndarray]:
-        """Ends of the axis, (3,) and (3,), m, object frame."""
-        return np.array(self.start), np.array(self.end)
+def _section(kind: type[Body]) -> Any:
+    """The section of a task file that gives a body of a kind."""
+    given: dict[str, Any] = {}
+    for each in fields(kind):
+        default = each.metadata.get("default")
+        more = {} if default is None else {"default_factory": default}
+        given[each.name] = (_TYPES[each.metadata["is"]], Field(description=each.metadata["about"], **more))
+    return create_model(kind.__name__, __base__=Primitive, __doc__=kind.__doc__, **given)
 
-    @model_serializer(mode="wrap")
-    def _tagged(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return {"capsule": handler(self)}
 
-    def moved(self, by: np.ndarray) -> Capsule:
-        """The same capsule shifted by ``by`` (3,), m."""
-        return Capsule(start=vector(np.array(self.start) + by), end=vector(np.array(self.end) + by), radius=self.radius)
+SECTIONS: dict[str, Any] = {name: _section(kind) for name, kind in KINDS.items()}
+Sphere, Capsule = SECTIONS["sphere"], SECTIONS["capsule"]
 
 
 def _kind(value: Any) -> str | None:
-    if isinstance(value, Sphere | Capsule):
+    if isinstance(value, Primitive):
         return type(value).__name__.lower()
     if isinstance(value, dict) and len(value) == 1:
         return str(next(iter(value)))
@@ -119,8 +71,7 @@ def _content(value: Any) -> Any:
     return next(iter(value.values())) if isinstance(value, dict) else value
 
 
-Shape = Annotated[
-    Annotated[Sphere, BeforeValidator(_content), Tag("sphere")]
-    | Annotated[Capsule, BeforeValidator(_content), Tag("capsule")],
+Shape: Any = Annotated[
+    reduce(or_, [Annotated[section, BeforeValidator(_content), Tag(name)] for name, section in SECTIONS.items()]),
     Discriminator(_kind),
 ]

@@ -9,10 +9,8 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from pydantic.fields import FieldInfo
 
 from casadi_hands.task.fields import Section
-from casadi_hands.task.shapes import Capsule, Sphere
+from casadi_hands.task.shapes import SECTIONS
 from casadi_hands.task.task import Task
-
-_KINDS: dict[str, type[Section]] = {"sphere": Sphere, "capsule": Capsule}
 
 
 def names_at(path: tuple[str | int, ...]) -> list[str]:
@@ -59,8 +57,8 @@ def _section_at(path: tuple[str | int, ...]) -> type[Section] | None:
     current: Any = Task
     for step in path:
         inner = sections_in(current)
-        if step in _KINDS and _KINDS[str(step)] in inner:
-            current = _KINDS[str(step)]
+        if step in SECTIONS and SECTIONS[str(step)] in inner:
+            current = SECTIONS[str(step)]
         elif isinstance(current, type) and issubclass(current, Section):
             field = fields_of(current).get(str(step))
             current = field.annotation if field else None

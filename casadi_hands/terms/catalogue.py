@@ -15,11 +15,19 @@ def single(weight: float | tuple[float, float, float]) -> float:
     return weight[-1] if isinstance(weight, tuple) else weight
 
 
+def _declared() -> list[Term]:
+    return [value for module in _MODULES for value in vars(module).values() if isinstance(value, Term)]
+
+
+def names() -> tuple[str, ...]:
+    """Of all declared terms, in alphabetical order."""
+    return tuple(sorted({term.name for term in _declared()}))
+
+
 def terms_of(stage: str) -> tuple[Term, ...]:
     """The terms that have a weight of their own in a stage, in the order of their declaration."""
-    declared = [value for module in _MODULES for value in vars(module).values() if isinstance(value, Term)]
     found: dict[str, Term] = {}
-    for term in declared:
+    for term in _declared():
         if stage in term.weights:
             found.setdefault(term.name, term)
     return tuple(found.values())

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import casadi as ca
 from casadi import SX
 
 from casadi_hands.geometry import penalty_spline, point_disc_distance, segment_distance
+from casadi_hands.geometry.bodies import Surface
+from casadi_hands.geometry.bodies.capsule import Segment
+from casadi_hands.geometry.pairs import core_distance
 from casadi_hands.nlp import Term, Weight
 
 _ROUNDING = 1e-3  # half the width of the spline's transition, half extents
@@ -28,19 +33,19 @@ def overlap(depth: SX) -> SX:
     return penalty_spline(depth, _ROUNDING)
 
 
-def links_and_object(ends: list[tuple[SX, SX]], radius: SX, primitives: SX) -> SX:
-    """Distances (L·K,) between the surfaces of a finger's links and the object's primitives.
+def links_and_object(ends: list[tuple[SX, SX]], radius: SX, bodies: Sequence[Surface]) -> SX:
+    """Distances (L·K,) between the surfaces of a finger's links and the object's bodies.
 
     Args:
         ends: both ends (3,) of each link's axis.
         radius: of the links.
-        primitives: (7, K) start, end and radius.
+        bodies: whose union the object is.
     """
     return ca.vertcat(
         *[
-            segment_distance(start, end, primitives[:3, k], primitives[3:6, k]) - radius - primitives[6, k]
+            core_distance(Segment(start, end), body.core) - radius - body.radius
             for start, end in ends
-            for k in range(primitives.shape[1])
+            for body in bodies
         ]
     )
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import casadi as ca
 from casadi import SX
 
-from casadi_hands.geometry import norm, project_to_capsule, soft_exponential
+from casadi_hands.geometry import norm, soft_exponential
 from casadi_hands.nlp import Term, Weight
 
 FORCE_REGULARISATION = Term(
@@ -122,16 +122,6 @@ def slip(force: SX, activity: SX, point: SX, point_before: SX, step: SX) -> SX:
 def acceleration(point_before: SX, point: SX, point_after: SX, step: SX) -> SX:
     """Second difference over the step, (3,) (eq. 2.13, as printed)."""
     return (point_after - 2 * point + point_before) / step
-
-
-def surface(point: SX, capsule: SX) -> tuple[SX, SX, SX]:
-    """Projection (3,), outward normal (3,) and signed distance of a point from a primitive.
-
-    Args:
-        point: (3,).
-        capsule: (7,) start, end and radius in the point's frame.
-    """
-    return project_to_capsule(point, capsule[:3], capsule[3:6], capsule[6])
 
 
 def friction_in_use(pressing: SX, across: SX, friction: SX) -> SX:

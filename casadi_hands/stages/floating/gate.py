@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import compress
 
 import numpy as np
 import pinocchio as pin
@@ -20,19 +21,10 @@ _PIVOT_RANK = 5  # of the grasp map of two contacts
 _GATE = 0.05  # m·g, unbalanced wrench that the gate lets pass: what the soft stages leave anyway
 
 
-def _surfaces(model: Model) -> tuple[Array, Array, Array]:
-    """Patches, capsules and friction of all contacts, the ground's included."""
-    if model.ground is None:
-        return model.patches, model.capsules, np.full(model.contacts, model.friction)
-    ground = model.ground
-    friction = np.append(np.full(model.contacts, model.friction), ground.friction)
-    return np.vstack([model.patches, ground.patch]), np.vstack([model.capsules, ground.capsule]), friction
-
-
 def least_squares_forces(model: Model, rotation: Array) -> Array:
     """Contact forces (C, 3) in the object's frame that hold its weight: a normal preload, corrected to balance."""
-    points, capsules, _ = _surfaces(model)
-    preload = _PRELOAD * inward_normals(points, capsules)
+    points = model.all_patches
+    preload = _PRELOAD * inward_normals(points, model.touched)
     grasp = grasp_map(points)
     missing = np.concatenate([-rotation.T @ model.gravity, np.zeros(3)]) - grasp @ preload.reshape(-1)
     return preload + (np.linalg.pinv(grasp) @ missing).reshape(-1, 3)
@@ -68,8 +60,8 @@ def passes_gate(model: Model, values: Mapping[str, Array], pivots: bool = False)
     rank of two contacts is enough: the object may hang between them, free about their line, while a finger lifts.
     """
     wrenches_needed = needed_wrenches(model, values["pose"])
-    _, capsules, friction = _surfaces(model)
-    contacts = len(capsules)
+    bodies, friction = model.touched, model.frictions
+    contacts = len(bodies)
     for k in range(len(model.schedule.keyframes)):
         points = values["point"][k].reshape(contacts, 3)
         active = values["activity"][k] > 0.5
@@ -80,7 +72,7 @@ def passes_gate(model: Model, values: Mapping[str, Array], pivots: bool = False)
         all_hold = np.linalg.matrix_rank(grasp_map(points), 1e-6)
         if np.linalg.matrix_rank(grasp, 1e-6) < (min(all_hold, _PIVOT_RANK) if pivots else all_hold):
             return False
-        edges = friction_edges(inward_normals(points[active], capsules[active]), friction[active])
+        edges = friction_edges(inward_normals(points[active], list(compress(bodies, active))), friction[active])
         wrenches = np.vstack([edges, np.zeros((3, edges.shape[1]))])
         for i, point in enumerate(points[active]):
             span = slice(i * EDGES, (i + 1) * EDGES)

@@ -6,7 +6,6 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from casadi_hands.geometry.contact_points import on_capsules
 from casadi_hands.problem.model import Model, Regrasp, palm_from_world
 
 Array = NDArray[np.float64]
@@ -74,8 +73,7 @@ def _turns(model: Model, pose: Array) -> list[Array]:
 
 
 def _on_surface(model: Model, contact: int, point: Array) -> Array:
-    capsule = model.capsules[contact : contact + 1]
-    return np.asarray(on_capsules(point[None], capsule)[0])
+    return model.touched[contact].on_surface(point)
 
 
 def _angle(first: Array, second: Array) -> float:

@@ -17,6 +17,7 @@ from casadi_hands.stages.floating.gate import least_squares_forces, passes_gate
 from casadi_hands.stages.floating.regrasp import held_back, planned_regrasp
 from casadi_hands.stages.object_motion.binding import bind_object, declare_object
 from casadi_hands.stages.object_motion.values import least_contacts, object_parameters, straight_path, term_weights
+from casadi_hands.stages.own_terms import bind_own, contact_names, own_missed
 
 Array = NDArray[np.float64]
 THRESHOLDS = (0.1, 0.2, 0.3)
@@ -58,6 +59,8 @@ class FloatingStage:
         problem = Problem()
         side = declare_object(problem, model)
         bind_object(problem, model, side)
+        rows = {"pose": side.pose[1], "point": side.point[1], "force": side.force, "activity": side.activity}
+        bind_own(problem, model, "floating", contact_names(model), {}, **rows)
         self.solver = Solver(problem)
 
     def start(self) -> dict[str, Array]:
@@ -92,7 +95,7 @@ class FloatingStage:
             solution = self._with_flags(flags, free.values, parameters)
             runs.append((f"threshold {threshold}", solution))
             better = solution.objective < (np.inf if best is None else best[1])
-            if better and passes_gate(self.model, solution.values):
+            if better and passes_gate(self.model, solution.values) and not own_missed(solution):
                 best = (threshold, solution.objective, solution)
         if best is None:
             solution = self._with_flags(np.ones_like(free.values["activity"]), free.values, parameters)

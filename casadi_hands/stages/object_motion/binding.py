@@ -113,30 +113,29 @@ def _bind_scenario(problem: Problem, model: Model, side: ObjectSide, force: Rows
         **problem.given("reference", "step", "gravity", "inertia", "inertial"),
         **external,
     )
-    capsules = problem.parameter(f"capsules{suffix}", (model.contacts, 7), quantity="capsule")
-    for i in range(model.contacts):
+    for i, body in enumerate(model.touched[: model.contacts]):
         problem.bind(
-            kernels.contact_forces(suffix),
+            kernels.contact_forces(type(body), suffix),
             {"in_cone": (0, np.inf)},
             f"contact{i}{suffix}",
             force=force.entries(3 * i, 3 * i + 3),
             activity=side.activity.entries(i, i + 1),
             point=side.point[1].entries(3 * i, 3 * i + 3),
             point_before=side.point[0].entries(3 * i, 3 * i + 3),
-            capsule=capsules.row(i),
+            body=problem.parameter(f"body{i}{suffix}", (1, body.width), quantity="body"),
             **problem.given("friction", "sharpness", "step"),
         )
     if model.ground is not None:
-        i = contacts - 1
+        i, body = contacts - 1, model.touched[-1]
         problem.bind(
-            kernels.ground_contact(suffix),
+            kernels.ground_contact(type(body), suffix),
             {"in_cone": (0, np.inf)},
             pose=side.pose[1],
             pose_before=side.pose[0],
             point=side.point[1].entries(3 * i, 3 * i + 3),
             force=force.entries(3 * i, 3 * i + 3),
             activity=side.activity.entries(i, i + 1),
-            capsule=problem.parameter(f"ground_capsule{suffix}", (1, 7), quantity="capsule"),
+            body=problem.parameter(f"ground_body{suffix}", (1, body.width), quantity="body"),
             friction=problem.parameter(f"ground_friction{suffix}", (1, 1), quantity="friction"),
             **problem.given("reference", "ground_height", "sharpness", "step"),
         )
@@ -175,14 +174,13 @@ def _bind_clearance(problem: Problem, model: Model, side: ObjectSide, palm: Rows
     for name, width in (("palm_position", 3), ("palm_quaternion", 4)):
         problem.parameter(name, (samples, width), when=0)
     problem.parameter("palm_radius", (1, 1))
-    primitives = problem.parameter("primitives", (len(model.primitives), 7), quantity="capsule")
     moved = {} if palm is None else {"palm": palm.combine(model.schedule.spline(), 0)}
     shared = ("palm_position", "palm_quaternion", "reference", "palm_radius", "ground_height", "clearance")
-    for i in range(len(model.primitives)):
+    for i, body in enumerate(model.bodies):
         problem.bind(
-            kernels.palm_clearance(moves=palm is not None),
+            kernels.palm_clearance(type(body), moves=palm is not None),
             pose=side.pose[1],
             **moved,
-            capsule=primitives.row(i),
+            body=problem.parameter(f"object{i}", (1, body.width), quantity="body"),
             **problem.given(*shared),
         )

@@ -8,11 +8,13 @@ import casadi as ca
 from casadi import SX
 
 from casadi_hands.geometry import point_disc_distance
+from casadi_hands.geometry.bodies import Body
 from casadi_hands.motion import angular_motion, exponential, multiply, rotation_matrix
 from casadi_hands.motion.pose import placed
 from casadi_hands.nlp import Kernel
 from casadi_hands.stages.object_motion.palm import Palm
-from casadi_hands.terms import body, clearance, contact
+from casadi_hands.terms import body as motion_terms
+from casadi_hands.terms import clearance, contact
 from casadi_hands.terms import constraints as limits
 
 
@@ -40,26 +42,26 @@ def dynamics(contacts: int, suffix: str = "", regularise: bool = True) -> Kernel
     acceleration = (after[0] - 2 * now[0] + before[0]) / step**2
     omega, alpha = angular_motion(before[1], now[1], after[1], step)
     rotation = rotation_matrix(now[1])
-    inertial_torque = inertial * body.gyroscopic(inertia, omega, alpha)
+    inertial_torque = inertial * motion_terms.gyroscopic(inertia, omega, alpha)
     kernel.cost(
-        body.LINEAR_MOMENTUM,
-        body.linear_momentum(ca.mtimes(rotation, forces), activity, gravity, external, acceleration, inertial),
+        motion_terms.LINEAR_MOMENTUM,
+        motion_terms.linear_momentum(ca.mtimes(rotation, forces), activity, gravity, external, acceleration, inertial),
         suffix,
     )
     local_torque = ca.mtimes(rotation.T, external_torque)
     kernel.cost(
-        body.ANGULAR_MOMENTUM,
-        body.angular_momentum(points, forces, activity, local_torque, inertial_torque),
+        motion_terms.ANGULAR_MOMENTUM,
+        motion_terms.angular_momentum(points, forces, activity, local_torque, inertial_torque),
         suffix,
     )
     if regularise:
-        kernel.cost(body.OBJECT_ACCELERATION, acceleration - kernel.parameter("carried_acceleration", 3))
-        kernel.cost(body.OBJECT_ANGULAR_ACCELERATION, inertial_torque / step)
+        kernel.cost(motion_terms.OBJECT_ACCELERATION, acceleration - kernel.parameter("carried_acceleration", 3))
+        kernel.cost(motion_terms.OBJECT_ANGULAR_ACCELERATION, inertial_torque / step)
     return kernel
 
 
 @cache
-def contact_forces(suffix: str = "") -> Kernel:
+def contact_forces(kind: type[Body], suffix: str = "") -> Kernel:
     """One finger contact at one sample: eq. 2.7, 2.8, 2.10, 2.12 and the slip they miss.
 
     Friction is also a constraint: the exponential of eq. 2.8 alone lets forces out of the cone by 0.1 m·g.
@@ -68,11 +70,10 @@ def contact_forces(suffix: str = "") -> Kernel:
     force, activity = kernel.variable("force", 3), kernel.variable("activity", 1)
     point = kernel.variable("point", 3, place=0)
     before = kernel.variable("point_before", 3, "point", -1)
-    capsule, friction, sharpness, step = (
-        kernel.parameter(n, k) for n, k in (("capsule", 7), ("friction", 1), ("sharpness", 1), ("step", 1))
-    )
-    projection, normal, _ = contact.surface(point, capsule)
-    projection_before, _, _ = contact.surface(before, capsule)
+    body = kind.surface(kernel.parameter("body", kind.width))
+    friction, sharpness, step = (kernel.parameter(name) for name in ("friction", "sharpness", "step"))
+    projection, normal, _ = body.project(point)
+    projection_before, _, _ = body.project(before)
     kernel.cost(contact.FORCE_REGULARISATION, activity * force, suffix)
     kernel.cost(contact.RAW_FORCE, force, suffix)
     cone = contact.friction_cone(force, -normal, friction, sharpness)
@@ -97,12 +98,12 @@ def contact_motion() -> Kernel:
 
 
 @cache
-def ground_contact(suffix: str = "") -> Kernel:
+def ground_contact(kind: type[Body], suffix: str = "") -> Kernel:
     """The contact of object and ground at one sample (section 3.1); its normal is the world's z."""
     kernel = Kernel("ground" + suffix)
     pose, pose_before = kernel.variable("pose", 6, place=0), kernel.variable("pose_before", 6, "pose", -1)
     point, force, activity = kernel.variable("point", 3), kernel.variable("force", 3), kernel.variable("activity", 1)
-    reference, capsule = kernel.parameter("reference", 4), kernel.parameter("capsule", 7)
+    reference, body = kernel.parameter("reference", 4), kind.surface(kernel.parameter("body", kind.width))
     height = kernel.parameter("ground_height")
     friction, sharpness, step = (kernel.parameter(n) for n in ("friction", "sharpness", "step"))
     position, quaternion = placed(pose, reference)
@@ -110,7 +111,7 @@ def ground_contact(suffix: str = "") -> Kernel:
     position_before, quaternion_before = placed(pose_before, reference)
     in_world = position + ca.mtimes(rotation, point)
     in_world_before = position_before + ca.mtimes(rotation_matrix(quaternion_before), point)
-    projection, normal, _ = contact.surface(point, capsule)
+    projection, normal, _ = body.project(point)
     kernel.cost(contact.FORCE_REGULARISATION, activity * force, suffix)
     kernel.cost(contact.RAW_FORCE, force, suffix)
     upward_in_object = rotation.T[:, 2]
@@ -135,7 +136,7 @@ def goal_pose() -> Kernel:
     target, vector = kernel.parameter("target", 3), kernel.parameter("vector", 3, "goal_vector")
     position, turned = placed(pose, reference)
     goal = multiply(exponential(vector), reference)
-    kernel.cost(body.TASK, body.task_pose(position, turned, target, goal))
+    kernel.cost(motion_terms.TASK, motion_terms.task_pose(position, turned, target, goal))
     return kernel
 
 
@@ -147,7 +148,7 @@ def goal_point() -> Kernel:
     reference = kernel.parameter("reference", 4)
     target, tool = kernel.parameter("target", 3), kernel.parameter("tool", 3)
     position, quaternion = placed(pose, reference)
-    kernel.cost(body.TOOL, body.task_point(position, rotation_matrix(quaternion), tool, target))
+    kernel.cost(motion_terms.TOOL, motion_terms.task_point(position, rotation_matrix(quaternion), tool, target))
     return kernel
 
 
@@ -159,30 +160,26 @@ def straight_path() -> Kernel:
     """
     kernel = Kernel("straight_path")
     pose, straight = kernel.variable("pose", 6), kernel.parameter("straight", 6)
-    kernel.cost(body.PATH, pose - straight)
+    kernel.cost(motion_terms.PATH, pose - straight)
     return kernel
 
 
-def capsule_in(pose_position: SX, rotation: SX, capsule: SX) -> tuple[SX, SX]:
-    """Both ends (3,) of a primitive's axis, moved by a pose."""
-    return pose_position + ca.mtimes(rotation, capsule[:3]), pose_position + ca.mtimes(rotation, capsule[3:6])
-
-
 @cache
-def palm_clearance(moves: bool) -> Kernel:
-    """One primitive of the object against palm and ground at one sample (section 3.2.3)."""
+def palm_clearance(kind: type[Body], moves: bool) -> Kernel:
+    """One body of the object against palm and ground at one sample (section 3.2.3)."""
     kernel = Kernel("palm_clearance")
     pose = kernel.variable("pose", 6)
     palm = Palm(kernel, moves)
-    reference, capsule = kernel.parameter("reference", 4), kernel.parameter("capsule", 7)
+    reference, body = kernel.parameter("reference", 4), kind.surface(kernel.parameter("body", kind.width))
     palm_radius, ground, margin = (kernel.parameter(name) for name in ("palm_radius", "ground_height", "clearance"))
     position, quaternion = placed(pose, reference)
-    ends = capsule_in(position, rotation_matrix(quaternion), capsule)
+    rotation = rotation_matrix(quaternion)
+    core = body.core.mapped(lambda point: position + ca.mtimes(rotation, point))
     costs: list[SX] = []
-    for point in (ends[0], (ends[0] + ends[1]) / 2, ends[1]):
-        distance = point_disc_distance(palm.sees(point), palm_radius) - capsule[6]
+    for point in core.marks(palm.axis):
+        distance = point_disc_distance(palm.sees(point), palm_radius) - body.radius
         costs.append(clearance.overlap(margin - distance))
-        costs.append(clearance.overlap(ground - (point[2] - capsule[6])))
+        costs.append(clearance.overlap(ground - (point[2] - body.radius)))
     kernel.cost(clearance.PALM_CLEARANCE, ca.vertcat(*costs))
     return kernel
 

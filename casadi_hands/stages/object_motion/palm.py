@@ -30,6 +30,11 @@ class Palm:
         """A world point (3,) in the palm frame."""
         return ca.mtimes(rotation_matrix(conjugate(self.quaternion)), point - self.position)
 
+    @property
+    def axis(self) -> SX:
+        """The palm's normal (3,), world frame."""
+        return rotation_matrix(self.quaternion)[:, 2]
+
     def turned(self, vector: SX) -> SX:
         """A world vector (3,) in palm axes."""
         return ca.mtimes(rotation_matrix(conjugate(self.quaternion)), vector)

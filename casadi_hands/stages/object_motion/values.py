@@ -11,6 +11,7 @@ from casadi_hands.motion import eased, linear
 from casadi_hands.nlp import Problem
 from casadi_hands.problem.model import Model, sizes
 from casadi_hands.problem.palm_motion import carried_along, carried_by_palm, goals_seen_from_palm
+from casadi_hands.stages.own_terms import own_values
 
 Array = NDArray[np.float64]
 CLEARANCE = 0.02  # half extents, asked of object and palm, and in exact motions of all bodies that do not touch
@@ -84,19 +85,20 @@ def object_parameters(model: Model) -> dict[str, Array | float]:
         "palm_position": model.palm_position,
         "palm_quaternion": model.palm_quaternion,
         "palm_radius": model.palm_radius,
-        "primitives": model.primitives,
         "targets": model.goal_positions,
         "straight": straight_path(model),
         "carried_acceleration": carried_acceleration(model),
     }
+    values |= {f"object{i}": body.parameters for i, body in enumerate(model.bodies)}
     if model.tool is not None:
         values["tool"], values["targets"] = model.tool, tool_path(model)
     else:
         values["vectors"] = model.goal_vectors
     for suffix in ("", "_perturbed") if model.disturbed else ("",):
-        values[f"capsules{suffix}"] = model.capsules
+        for i, body in enumerate(model.touched[: model.contacts]):
+            values[f"body{i}{suffix}"] = body.parameters
         if ground is not None:
-            values[f"ground_capsule{suffix}"] = ground.capsule
+            values[f"ground_body{suffix}"] = model.touched[-1].parameters
             values[f"ground_friction{suffix}"] = ground.friction
     if model.disturbed:
         values["external_force_perturbed"] = model.disturbance_force
@@ -104,12 +106,16 @@ def object_parameters(model: Model) -> dict[str, Array | float]:
     return values
 
 
-def term_weights(problem: Problem, model: Model, weights: Mapping[str, float]) -> dict[str, float]:
-    """Weight parameters of a stage: each a mean over the goals, or a drawing's samples, or the keyframes."""
+def term_weights(problem: Problem, model: Model, weights: Mapping[str, float]) -> dict[str, Array | float]:
+    """Weight parameters of a stage: each a mean over the goals, or a drawing's samples, or the keyframes.
+
+    A person's own terms are means over the samples, and come with the values of their parameters.
+    """
     keyframes, samples, _ = sizes(model)
     goals = samples if model.tool is not None else len(model.goal_positions)
-    values = {}
+    values, own = dict(own_values(problem, model)), {term.name for term in model.own_terms}
     for name, term in problem.declared_terms.items():
         per_goal = any(weight.per == "goal" for weight in term.weights.values())
-        values[f"weight.{name}"] = float(weights[term.weighs_as or term.name]) / (goals if per_goal else keyframes)
+        count = samples if name in own else goals if per_goal else keyframes
+        values[f"weight.{name}"] = float(weights[term.weighs_as or term.name]) / count
     return {**values, "sharpness": float(weights["friction_sharpness"])}

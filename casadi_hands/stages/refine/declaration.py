@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from casadi_hands.geometry.bodies import width_of
 from casadi_hands.kinematics.singularity import SIZES
 from casadi_hands.nlp import Kernel, Parameter, Problem, Rows
 from casadi_hands.nlp.arguments import Argument
@@ -92,7 +93,7 @@ class Declaration:
         problem, structure, count = self.problem, self.structure, self.knots
         widths = {"reference": 4, "gravity": 3, "inertial": 1, "inertia": 9, "inverse": 9, "radius": 1}
         widths |= {"palm_radius": 1, "ground_height": 1, "friction": 1}
-        widths |= {"primitives": 7 * len(structure.model.primitives)}
+        widths |= {"bodies": width_of(structure.model.kinds)}
         for name, width in widths.items():
             problem.parameter(name, (1, width))
         problem.parameter("step", (count - 1, 1))
@@ -101,7 +102,7 @@ class Declaration:
         for name, width in (("palm_position", 3), ("palm_quaternion", 4)):
             problem.parameter(f"{name}_between", (count - 1, width), quantity=name)
         for c in structure.columns:
-            self._own("capsule", c, (1, 7))
+            self._own("body", c, (1, structure.model.touched[c].width))
             for name in ("wanted_point", "wanted_force"):
                 self._own(name, c, (count, 3))
         for c, n in zip(structure.contacts, structure.joints, strict=True):
@@ -136,7 +137,7 @@ class Declaration:
     def scene(self, contact: int, knots: Knots) -> dict[str, Parameter]:
         """What places object and palm for a contact at some knots."""
         names = ("reference", "palm_position", "palm_quaternion", "radius")
-        return self.at(knots, *names) | self.of(contact, knots, "capsule")
+        return self.at(knots, *names) | self.of(contact, knots, "body")
 
     def bind(
         self,

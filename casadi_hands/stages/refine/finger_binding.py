@@ -15,6 +15,7 @@ def bind_contact(of: Declaration, i: int) -> None:
     """A finger's contact: on both surfaces, in its cone, actuated, rolling, also under the task's disturbances."""
     structure = of.structure
     c, n, torque = structure.contacts[i], structure.joints[i], structure.model.torque_limit
+    kind = type(structure.model.touched[c])
     point, force = (rows.entries(3 * i, 3 * i + 3) for rows in (of.point, of.force))
     # The torque is bound only where the task limits it.
     actuated = {**IN_CONE, "passive": FREE, "torque": (-torque, torque)}
@@ -23,7 +24,7 @@ def bind_contact(of: Declaration, i: int) -> None:
     names = ("frames", "tie", "wanted_point", "wanted_force", *(["branch"] if n in SIZES else []))
     of.bind(
         touching,
-        kernels.contact(n, limited),
+        kernels.contact(n, kind, limited),
         {"on_object": (0.0, 0.0), "on_link": (0.0, 0.0), "regular": FREE, **actuated},
         (c,),
         f"contact{c}",
@@ -41,7 +42,7 @@ def bind_contact(of: Declaration, i: int) -> None:
         knots = of.disturbed[disturbed]
         of.bind(
             knots,
-            kernels.disturbed_contact(n, limited),
+            kernels.disturbed_contact(n, kind, limited),
             actuated,
             (c,),
             f"disturbed_contact{c}",
@@ -58,7 +59,7 @@ def bind_contact(of: Declaration, i: int) -> None:
     scenes = of.scene(c, start), of.scene(c, start + 1)
     of.bind(
         start,
-        kernels.rolling(n),
+        kernels.rolling(n, kind),
         {"no_slip": FREE},
         (c,),
         f"rolling{c}",
@@ -75,7 +76,7 @@ def bind_contact(of: Declaration, i: int) -> None:
     halves = structure.middles.weights(start)
     of.bind(
         start,
-        kernels.actuated(n),
+        kernels.actuated(n, kind),
         {"passive": FREE},
         (c,),
         f"inter_knot{c}",
@@ -86,7 +87,7 @@ def bind_contact(of: Declaration, i: int) -> None:
         force=force.combine(halves),
         **of.at(start, "reference", "radius"),
         **of.between(start),
-        **of.of(c, start, "frames", "capsule"),
+        **of.of(c, start, "frames", "body"),
     )
 
 
@@ -99,7 +100,7 @@ def bind_clearance(of: Declaration, i: int) -> None:
     """A finger clear of palm, ground, itself and the object, but for what its last link touches."""
     structure, model = of.structure, of.structure.model
     c, n = structure.contacts[i], structure.joints[i]
-    touched = int(np.argmin(np.abs(model.primitives - model.capsules[c]).sum(axis=1)))
+    touched = model.contact_bodies[c]
     touching, idle = structure.touching[:, i], np.flatnonzero(~structure.active[:-1, i])
 
     def bind(
@@ -107,14 +108,14 @@ def bind_clearance(of: Declaration, i: int) -> None:
     ) -> None:
         of.bind(
             knots,
-            kernels.apart(n, len(model.primitives), skipped, model.ground is not None),
+            kernels.apart(n, model.kinds, skipped, model.ground is not None),
             {"clear": (least, np.inf)},
             (c,),
             f"{kind}{c}",
             **_shape(of, i, knots),
             **moving,
             **palm,
-            **of.at(knots, "reference", "radius", "palm_radius", "ground_height", "primitives"),
+            **of.at(knots, "reference", "radius", "palm_radius", "ground_height", "bodies"),
             **of.of(c, knots, "frames"),
         )
 

@@ -9,7 +9,9 @@ import casadi as ca
 from casadi import SX
 
 from casadi_hands.geometry import norm
-from casadi_hands.geometry.surface import from_axis, path_between, smooth_surface, tangents
+from casadi_hands.geometry.bodies import Body, Surface, surfaces, width_of
+from casadi_hands.geometry.bodies.capsule import Segment
+from casadi_hands.geometry.surface import path_between, tangents
 from casadi_hands.kinematics.singularity import SIZES, regularity
 from casadi_hands.kinematics.symbols import FingerSymbols, PlacedFinger, morphology
 from casadi_hands.motion import conjugate, derivative, rotation_matrix
@@ -20,6 +22,7 @@ from casadi_hands.terms import clearance, finger
 from casadi_hands.terms import constraints as limits
 from casadi_hands.terms import contact as contact_terms
 
+ROUNDING = 1e-6  # half extents, of distances where they vanish
 LEVER = 0.06  # half extents/rad: forces that need a shorter lever than about this count as not supplied
 
 
@@ -60,15 +63,22 @@ class Scene:
     reference: SX
     palm_position: SX
     palm_quaternion: SX
-    capsule: SX
+    body: Surface
     radius: SX
 
     @classmethod
-    def declare(cls, kernel: Kernel, place: int | None = None) -> Scene:
-        """Declare them in a kernel, at one of several knots if told so."""
-        names = (("reference", 4), ("palm_position", 3), ("palm_quaternion", 4), ("capsule", 7), ("radius", 1))
+    def declare(cls, kernel: Kernel, kind: type[Body], place: int | None = None) -> Scene:
+        """Declare them in a kernel, for a contact on a body of a kind, at one of several knots if told so."""
         tag = "" if place is None else str(place)
-        return cls(*[kernel.parameter(name + tag, size, name, place) for name, size in names])
+
+        def declared(name: str, size: int) -> SX:
+            return kernel.parameter(name + tag, size, name, place)
+
+        reference, position, quaternion = (
+            declared(n, k) for n, k in (("reference", 4), ("palm_position", 3), ("palm_quaternion", 4))
+        )
+        body = kind.surface(declared("body", kind.width))
+        return cls(reference, position, quaternion, body, declared("radius", 1))
 
     def touch(self, pose: SX, point: SX, angles: SX, symbols: FingerSymbols) -> Touch:
         """See a contact point (3,), object frame, from the object and from a finger's last link."""
@@ -78,18 +88,17 @@ class Scene:
         in_palm = ca.mtimes(rotation, point) + ca.mtimes(to_palm, position - self.palm_position)
         skeleton = symbols.placed(angles, self.radius)
         on_link = ca.mtimes(skeleton.tip_rotation.T, in_palm - skeleton.origins[:, -1])
-        off_object, normal = smooth_surface(point, self.capsule[:3], self.capsule[3:6], self.capsule[6])
-        end = ca.vertcat(0, 0, symbols.lengths[-1])
-        from_end = from_axis(on_link, SX.zeros(3, 1), end)
-        from_link = ca.mtimes(rotation.T, ca.mtimes(skeleton.tip_rotation, from_end))
-        from_object = from_axis(point, self.capsule[:3], self.capsule[3:6])
-        off_link = from_link + self.radius / self.capsule[6] * from_object
+        off_object, normal = self.body.distance_and_normal(point, ROUNDING)
+        axis = Segment(SX.zeros(3, 1), ca.vertcat(0, 0, symbols.lengths[-1]))
+        from_axis = axis.offset(on_link)
+        from_link = ca.mtimes(rotation.T, ca.mtimes(skeleton.tip_rotation, from_axis))
+        off_link = from_link + self.radius * normal
         here = symbols.placed(angles, self.radius, on_link)
-        return Touch(on_link, off_object, off_link, normal, from_end / norm(from_end, 1e-6), rotation, here)
+        return Touch(on_link, off_object, off_link, normal, from_axis / norm(from_axis, ROUNDING), rotation, here)
 
 
 @cache
-def contact(joints: int, limited: bool) -> Kernel:
+def contact(joints: int, kind: type[Body], limited: bool) -> Kernel:
     """One touching contact at one knot: on both surfaces, normals opposed, in the cone, supplied by the joints.
 
     Constraints: ``on_object`` (1), ``on_link`` (3: surface and normal, see ``Touch``), those of ``_hold`` and, of a
@@ -100,7 +109,7 @@ def contact(joints: int, limited: bool) -> Kernel:
     symbols = free_morphology(kernel, joints)
     pose, point, force = kernel.variable("pose", 6), kernel.variable("point", 3), kernel.variable("force", 3)
     angles = kernel.variable("angles", joints)
-    scene = Scene.declare(kernel)
+    scene = Scene.declare(kernel, kind)
     friction, tie = kernel.parameter("friction"), kernel.parameter("tie")
     wanted_point, wanted_force = kernel.parameter("wanted_point", 3), kernel.parameter("wanted_force", 3)
     touch = scene.touch(pose, point, angles, symbols)
@@ -119,13 +128,13 @@ def contact(joints: int, limited: bool) -> Kernel:
 
 
 @cache
-def disturbed_contact(joints: int, limited: bool) -> Kernel:
+def disturbed_contact(joints: int, kind: type[Body], limited: bool) -> Kernel:
     """A second force of a touching contact at one knot: in the cone, and supplied by the joints, as the first."""
     kernel = Kernel("disturbed_contact")
     symbols = free_morphology(kernel, joints)
     pose, point, angles = kernel.variable("pose", 6), kernel.variable("point", 3), kernel.variable("angles", joints)
     force = kernel.variable("force", 3)
-    scene, friction = Scene.declare(kernel), kernel.parameter("friction")
+    scene, friction = Scene.declare(kernel, kind), kernel.parameter("friction")
     touch = scene.touch(pose, point, angles, symbols)
     _, _, passive = _hold(kernel, touch, force, friction, limited, disturbed=True)
     kernel.cost(finger.PASSIVE_FORCE, passive)
@@ -133,13 +142,13 @@ def disturbed_contact(joints: int, limited: bool) -> Kernel:
 
 
 @cache
-def actuated(joints: int) -> Kernel:
+def actuated(joints: int, kind: type[Body]) -> Kernel:
     """A contact's force at any time: ``passive`` (3) is what no joint supplies of it."""
     kernel = Kernel("actuated")
     symbols = free_morphology(kernel, joints)
     pose, point, angles = kernel.variable("pose", 6), kernel.variable("point", 3), kernel.variable("angles", joints)
     force = kernel.variable("force", 3)
-    passive = _passive(Scene.declare(kernel).touch(pose, point, angles, symbols), force)
+    passive = _passive(Scene.declare(kernel, kind).touch(pose, point, angles, symbols), force)
     kernel.constrain(limits.ACTUATED, passive)
     kernel.cost(finger.PASSIVE_FORCE, passive)
     return kernel
@@ -171,7 +180,7 @@ def _passive(touch: Touch, force: SX) -> SX:
 
 
 @cache
-def rolling(joints: int) -> Kernel:
+def rolling(joints: int, kind: type[Body]) -> Kernel:
     """One contact from one knot to the next: its paths over both surfaces agree (no slip), and its spin costs."""
     kernel = Kernel("rolling")
     symbols = free_morphology(kernel, joints)
@@ -180,7 +189,7 @@ def rolling(joints: int) -> Kernel:
         poses.append(kernel.variable(f"pose{i}", 6, "pose", i))
         points.append(kernel.variable(f"point{i}", 3, "point", i))
         angles.append(kernel.variable(f"angles{i}", joints, "angles", i))
-    scenes = [Scene.declare(kernel, i) for i in range(2)]
+    scenes = [Scene.declare(kernel, kind, i) for i in range(2)]
     helper, step = kernel.parameter("helper", 3), kernel.parameter("step")
     before, after = (scenes[i].touch(poses[i], points[i], angles[i], symbols) for i in range(2))
     turns = before.placed.tip_rotation, after.placed.tip_rotation
@@ -198,13 +207,13 @@ def rolling(joints: int) -> Kernel:
 
 
 @cache
-def apart(joints: int, primitives: int, touched: int | None, grounded: bool) -> Kernel:
+def apart(joints: int, kinds: tuple[type[Body], ...], touched: int | None, grounded: bool) -> Kernel:
     """One finger clear of palm, ground, itself and the object at one time.
 
     Args:
         joints: of the finger.
-        primitives: of the object.
-        touched: the primitive the last link touches, left out; None where it must stay clear of all.
+        kinds: of the object's bodies.
+        touched: index of the body that the last link touches, left out; None where it must stay clear of all.
         grounded: whether there is a ground.
     """
     kernel = Kernel("apart")
@@ -218,20 +227,15 @@ def apart(joints: int, primitives: int, touched: int | None, grounded: bool) -> 
         kernel.parameter("palm_radius"),
         kernel.parameter("ground_height"),
     )
-    shapes = ca.reshape(kernel.parameter("primitives", 7 * primitives), 7, primitives)
+    bodies = surfaces(kinds, kernel.parameter("bodies", width_of(kinds)))
     position, quaternion = placed(pose, reference)
     to_palm = rotation_matrix(conjugate(palm_quaternion))
     rotation, center = ca.mtimes(to_palm, rotation_matrix(quaternion)), ca.mtimes(to_palm, position - palm_position)
-    seen = [
-        ca.vertcat(
-            ca.mtimes(rotation, shapes[:3, k]) + center, ca.mtimes(rotation, shapes[3:6, k]) + center, shapes[6, k]
-        )
-        for k in range(primitives)
-    ]
+    seen = [body.mapped(lambda point: ca.mtimes(rotation, point) + center) for body in bodies]
     here = symbols.placed(angles, radius)
     up = to_palm[:, 2] if grounded else None
-    clear, last = distances(here, radius, palm_radius, ca.horzcat(*seen), up, ground - palm_position[2])
-    others = [last[k] for k in range(primitives) if k != touched]
+    clear, last = distances(here, radius, palm_radius, seen, up, ground - palm_position[2])
+    others = [last[k] for k in range(len(kinds)) if k != touched]
     kernel.constrain(limits.CLEAR, ca.vertcat(clear, *others))
     return kernel
 

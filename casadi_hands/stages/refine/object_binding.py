@@ -62,10 +62,10 @@ def bind_object(of: Declaration) -> None:
     problem, model, every = of.problem, of.structure.model, np.arange(of.knots)
     of.bind(
         every,
-        kernels.object_apart(len(model.primitives), model.ground is not None),
+        kernels.object_apart(model.kinds, model.ground is not None),
         {"palm": (CLEARANCE, np.inf), "ground": (-GOAL_TOLERANCE, np.inf)},
         pose=of.pose,
-        **of.at(every, "reference", "palm_position", "palm_quaternion", "palm_radius", "ground_height", "primitives"),
+        **of.at(every, "reference", "palm_position", "palm_quaternion", "palm_radius", "ground_height", "bodies"),
     )
     if model.tool is None:
         goals = problem.parameter("goals", (len(model.goal_positions), 6), quantity="goal_pose")
@@ -82,29 +82,29 @@ def bind_ground(of: Declaration) -> None:
     problem, structure = of.problem, of.structure
     friction = problem.parameter("ground_friction", (1, 1), quantity="friction")
     column, c = len(structure.contacts), structure.columns[-1]
-    span = 3 * column, 3 * column + 3
+    span, kind = (3 * column, 3 * column + 3), type(structure.model.touched[c])
     point, force = of.point.entries(*span), of.force.entries(*span)
     touching = np.flatnonzero(structure.touching[:, column])
     of.bind(
         touching,
-        kernels.ground_contact(),
+        kernels.ground_contact(kind),
         {"on_surfaces": (0, 0), "opposed": (0, 0), "facing": (-np.inf, -0.5), **IN_CONE},
         pose=of.pose.take(touching),
         point=point.take(touching),
         force=force.take(touching),
         friction=friction,
         **of.at(touching, "reference", "ground_height"),
-        **of.of(c, touching, "capsule", "wanted_point", "wanted_force"),
+        **of.of(c, touching, "body", "wanted_point", "wanted_force"),
     )
     start = np.flatnonzero(structure.active[:-1, column])
     of.bind(
         start,
-        kernels.ground_rolling(),
+        kernels.ground_rolling(kind),
         {"no_slip": FREE},
         pose=(of.pose.take(start), of.pose.take(start + 1)),
         point=(point.take(start), point.take(start + 1)),
         **of.at(start, "reference", "step"),
-        **of.of(c, start, "capsule"),
+        **of.of(c, start, "body"),
     )
     disturbed = np.flatnonzero(structure.active[of.disturbed, column])
     if len(disturbed):

@@ -9,13 +9,15 @@ from casadi import SX
 from numpy.polynomial.legendre import leggauss
 
 from casadi_hands.geometry import point_disc_distance
-from casadi_hands.geometry.surface import path_between, smooth_surface
+from casadi_hands.geometry.bodies import Body, surfaces, width_of
+from casadi_hands.geometry.surface import path_between
 from casadi_hands.motion import conjugate, derivative, multiply, rotation_matrix
 from casadi_hands.motion.pose import placed
 from casadi_hands.nlp import Constraint, Kernel
 from casadi_hands.terms import body, contact
 from casadi_hands.terms import constraints as limits
 
+ROUNDING = 1e-6  # half extents, of distances where they vanish
 # Gauss and Legendre's points and weights, for a step from 0 to 1.
 _GAUSS, _GAUSS_WEIGHTS = (leggauss(3)[0] + 1) / 2, leggauss(3)[1] / 2
 
@@ -188,7 +190,7 @@ def meet_goal() -> Kernel:
 
 
 @cache
-def ground_contact() -> Kernel:
+def ground_contact(kind: type[Body]) -> Kernel:
     """The object's contact with the ground at one knot; the ground's normal is the world's z.
 
     Constraints: ``on_surfaces`` (2: off the object, off the ground), ``opposed`` (2), ``facing`` (1), ``pressing``
@@ -196,12 +198,12 @@ def ground_contact() -> Kernel:
     """
     kernel = Kernel("ground")
     pose, point, force = kernel.variable("pose", 6), kernel.variable("point", 3), kernel.variable("force", 3)
-    reference, capsule = kernel.parameter("reference", 4), kernel.parameter("capsule", 7)
+    reference, touched = kernel.parameter("reference", 4), kind.surface(kernel.parameter("body", kind.width))
     height, friction = kernel.parameter("ground_height"), kernel.parameter("friction")
     wanted_point, wanted_force = kernel.parameter("wanted_point", 3), kernel.parameter("wanted_force", 3)
     position, quaternion = placed(pose, reference)
     rotation = rotation_matrix(quaternion)
-    off_object, normal = smooth_surface(point, capsule[:3], capsule[3:6], capsule[6])
+    off_object, normal = touched.distance_and_normal(point, ROUNDING)
     outward, exerted = ca.mtimes(rotation, normal), ca.mtimes(rotation, force)
     above = position[2] + ca.dot(rotation[2, :].T, point) - height
     kernel.constrain(limits.ON_SURFACES, ca.vertcat(off_object, above))
@@ -232,20 +234,17 @@ def _hold(kernel: Kernel, exerted: SX, friction: SX, declared: tuple[Constraint,
 
 
 @cache
-def ground_rolling() -> Kernel:
+def ground_rolling(kind: type[Body]) -> Kernel:
     """The object's contact with the ground from one knot to the next: it rolls or stands, and does not slip."""
     kernel = Kernel("ground_rolling")
     ends = [(kernel.variable(f"pose{i}", 6, "pose", i), kernel.variable(f"point{i}", 3, "point", i)) for i in range(2)]
-    reference, capsule, step = (
-        kernel.parameter("reference", 4),
-        kernel.parameter("capsule", 7),
-        kernel.parameter("step"),
-    )
+    reference, touched = kernel.parameter("reference", 4), kind.surface(kernel.parameter("body", kind.width))
+    step = kernel.parameter("step")
     points, normals, rotations, world = [], [], [], []
     for pose, point in ends:
         position, quaternion = placed(pose, reference)
         points.append(point)
-        normals.append(smooth_surface(point, capsule[:3], capsule[3:6], capsule[6])[1])
+        normals.append(touched.distance_and_normal(point, ROUNDING)[1])
         rotations.append(rotation_matrix(quaternion))
         world.append(position + ca.mtimes(rotations[-1], point))
     slip = (path_between(points, normals, rotations) - world[1] + world[0])[:2]
@@ -255,7 +254,7 @@ def ground_rolling() -> Kernel:
 
 
 @cache
-def object_apart(primitives: int, grounded: bool) -> Kernel:
+def object_apart(kinds: tuple[type[Body], ...], grounded: bool) -> Kernel:
     """The object clear of the palm, and above the ground if there is one, at one knot."""
     kernel = Kernel("object_apart")
     pose = kernel.variable("pose", 6)
@@ -263,16 +262,16 @@ def object_apart(primitives: int, grounded: bool) -> Kernel:
         kernel.parameter(n, k) for n, k in (("reference", 4), ("palm_position", 3), ("palm_quaternion", 4))
     )
     palm_radius, ground = kernel.parameter("palm_radius"), kernel.parameter("ground_height")
-    shapes = ca.reshape(kernel.parameter("primitives", 7 * primitives), 7, primitives)
+    bodies = surfaces(kinds, kernel.parameter("bodies", width_of(kinds)))
     position, quaternion = placed(pose, reference)
     rotation, to_palm = rotation_matrix(quaternion), rotation_matrix(conjugate(palm_quaternion))
     palm, above = [], []
-    for k in range(primitives):
-        start, end = (position + ca.mtimes(rotation, shapes[i : i + 3, k]) for i in (0, 3))
-        for point in (start, (start + end) / 2, end):
+    for each in bodies:
+        core = each.core.mapped(lambda point: position + ca.mtimes(rotation, point))
+        for point in core.marks(to_palm[2, :].T):
             seen = ca.mtimes(to_palm, point - palm_position)
-            palm.append(point_disc_distance(seen, palm_radius) - shapes[6, k])
-        above += [point[2] - shapes[6, k] - ground for point in (start, end)]
+            palm.append(point_disc_distance(seen, palm_radius) - each.radius)
+        above += [point[2] - each.radius - ground for point in core.lowest(SX([0, 0, 1]))]
     kernel.constrain(limits.CLEAR_OF_PALM, ca.vertcat(*palm))
     if grounded:
         kernel.constrain(limits.ABOVE_GROUND, ca.vertcat(*above))

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from casadi_hands.problem.structure import Structure
-from casadi_hands.stages.refine.declaration import Declaration
+from casadi_hands.stages.own_terms import bind_own, contact_names
+from casadi_hands.stages.refine.declaration import Block, Declaration
 from casadi_hands.stages.refine.finger_binding import bind_clearance, bind_contact, bind_pair, bind_shape
 from casadi_hands.stages.refine.object_binding import bind_ground, bind_object, bind_physics
 from casadi_hands.stages.refine.restoration import Proximity
@@ -31,4 +34,15 @@ class RefineProblem(Declaration):
             bind_shape(self, i)
             for j in range(i):
                 bind_pair(self, i, j, guarded)
+        self._bind_own()
         self.proximity = Proximity(self.problem)
+
+    def _bind_own(self) -> None:
+        """A person's own terms, last of all that is of the motion."""
+        model, structure = self.structure.model, self.structure
+        contacts = [contact_names(model)[c] for c in structure.columns]
+        angles = dict(zip(structure.contacts, self.angles, strict=True))
+        rows = {"pose": self.pose, "point": self.point, "force": self.force}
+        kernel = bind_own(self.problem, model, "refine", contacts, angles, **rows)
+        if kernel is not None:
+            self.blocks[kernel.name] = Block(kernel, np.arange(self.knots), ())

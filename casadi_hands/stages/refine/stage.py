@@ -20,6 +20,7 @@ from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.resampling import shortened
 from casadi_hands.problem.structure import Structure
+from casadi_hands.stages.own_terms import own_weights
 from casadi_hands.stages.refine.inter_knot import pass_through
 from casadi_hands.stages.refine.problem import RefineProblem
 from casadi_hands.stages.refine.result import Refined, Run, Worst
@@ -103,7 +104,8 @@ class RefineStage:
         runs: list[Run] = []
         slips: dict[str, float] = {}
         most = 0.0
-        for what, weights, options in way:
+        for what, given_weights, options in way:
+            weights = given_weights | own_weights(self.model, "refine")
             most, before = max(slips.values(), default=0.0), most
             if what == "firmer" and not HOPELESS < most < FALLING * before:
                 continue
@@ -145,7 +147,8 @@ class RefineStage:
 
     def costs(self, step: Step, start: WholeHand, margin: Margin) -> dict[str, float]:
         """The weighted terms of a motion, as a step weights them."""
-        parameters = self.given.parameters(start, margin) | self._weighted(step[1])
+        weights = step[1] | own_weights(self.model, "refine")
+        parameters = self.given.parameters(start, margin) | self._weighted(weights)
         return self.solver.evaluate(self.given.start(start), parameters)
 
     def _weighted(self, weights: Mapping[str, float]) -> dict[str, ArrayLike]:

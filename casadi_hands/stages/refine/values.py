@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from casadi_hands.geometry import nearest_on_axis
+from casadi_hands.geometry.bodies import Body, packed
 from casadi_hands.kinematics.singularity import REGULAR, SIZES, branches
 from casadi_hands.motion import continuous
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.placement import contact_jacobians
 from casadi_hands.stages.object_motion.values import MOST_FORCE, MOST_TURN, tool_path
+from casadi_hands.stages.own_terms import own_values
 from casadi_hands.stages.refine.initial_guess import balanced, perturbations, rates_and_wrenches
 from casadi_hands.stages.refine.problem import RefineProblem
 
@@ -163,7 +164,7 @@ class RefineValues:
             "palm_radius": model.palm_radius,
             "ground_height": model.ground_height,
             "friction": margin.friction * model.friction,
-            "primitives": model.primitives.reshape(1, -1),
+            "bodies": packed(model.bodies),
             "step": np.diff(model.schedule.samples)[:, None],
             "palm_position": motion.palm_position,
             "palm_quaternion": motion.palm_quaternion,
@@ -172,6 +173,7 @@ class RefineValues:
             "wanted_pose": np.hstack([wanted.position, wanted.vector]),
         }
         values |= self.proximity.idle
+        values |= own_values(self.problem, model)
         if len(self.disturbed):
             values["external_force"] = model.disturbance_force[self.disturbed]
             values["external_torque"] = model.disturbance_torque[self.disturbed]
@@ -181,18 +183,17 @@ class RefineValues:
             values["tool"], values["tool_path"] = model.tool, tool_path(model)
         if self.structure.grounded and model.ground is not None:
             values["ground_friction"] = margin.friction * model.ground.friction
-            values[f"capsule{model.contacts}"] = model.ground.capsule
         for c in self.structure.columns:
             values[f"wanted_point{c}"], values[f"wanted_force{c}"] = wanted.point[:, c], wanted.force[:, c]
+            values[f"body{c}"] = model.touched[c].parameters
         for c, finger in zip(self.structure.contacts, wanted.fingers, strict=True):
             if finger.joints in SIZES:
                 values[f"branch{c}"] = 0.0
             values[f"frames{c}"] = finger.frames.transpose(0, 2, 1).reshape(1, -1)
             values[f"wanted_base{c}"], values[f"wanted_lengths{c}"] = finger.base, finger.lengths
             values[f"wanted_axes{c}"] = finger.axes.reshape(1, -1)
-            values[f"capsule{c}"] = model.capsules[c]
             values[f"tie{c}"] = SLIDING_TIE if model.slides(c) else LIFTING_TIE if model.lifts(c) else 1.0
-            values[f"helper{c}"] = _helpers(motion.point[:, c], model.capsules[c])
+            values[f"helper{c}"] = _helpers(motion.point[:, c], model.touched[c])
         return values
 
 
@@ -211,14 +212,11 @@ def longest_run(flags: NDArray[np.bool_], lengths: Array) -> float:
     return float((passed[edges[1::2]] - passed[edges[::2]]).max(initial=0.0))
 
 
-def _helpers(points: Array, capsule: Array) -> Array:
+def _helpers(points: Array, body: Body) -> Array:
     """Vectors (S, 3) well across the surface normal at each contact point, continuous along the motion."""
-    along = capsule[3:6] - capsule[:3]
-    helper = along / np.linalg.norm(along) if np.linalg.norm(along) > 1e-9 else np.eye(3)[0]
-    helpers = []
+    helper, helpers = body.helper, []
     for point in points:
-        _, normal = nearest_on_axis(point, capsule)
-        normal = normal / np.linalg.norm(normal)
+        normal = body.outward(point)
         across = helper - (helper @ normal) * normal
         if np.linalg.norm(across) < 0.5:
             across = np.eye(3)[np.argmin(np.abs(normal))]

@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from casadi_hands.geometry.bodies import Body, surfaces, width_of
 from casadi_hands.kinematics.symbols import morphology, tip_point
 from casadi_hands.nlp import Kernel
 from casadi_hands.terms import clearance, finger
@@ -57,14 +58,14 @@ def build(joints: int) -> Kernel:
 
 
 @cache
-def collide(joints: int, primitives: int) -> Kernel:
+def collide(joints: int, kinds: tuple[type[Body], ...]) -> Kernel:
     """One finger against object, palm, ground and itself at one time (eq. 2.20)."""
     kernel = Kernel("collide")
     frames = kernel.parameter("frames", 9 * joints)
     symbols = morphology(kernel.variable, frames, joints)
     angles = kernel.variable("angles", joints)
     radius, palm_radius, margin = (kernel.parameter(name) for name in ("link_radius", "palm_radius", "margin"))
-    shapes = ca.reshape(kernel.parameter("primitives", 7 * primitives), 7, primitives)
+    bodies = surfaces(kinds, kernel.parameter("bodies", width_of(kinds)))
     up, ground = kernel.parameter("up", 3), kernel.parameter("ground")
     ends = symbols.placed(angles, radius).ends
     apart = [
@@ -73,8 +74,8 @@ def collide(joints: int, primitives: int) -> Kernel:
         clearance.links_of_one(ends, radius),
     ]
     if joints > 1:
-        apart.append(clearance.links_and_object(ends[:-1], radius, shapes))
-    touching = clearance.links_and_object(ends[-1:], radius, shapes)
+        apart.append(clearance.links_and_object(ends[:-1], radius, bodies))
+    touching = clearance.links_and_object(ends[-1:], radius, bodies)
     kernel.cost(clearance.COLLISION, clearance.overlap(ca.vertcat(margin - ca.vertcat(*apart), -touching)))
     return kernel
 

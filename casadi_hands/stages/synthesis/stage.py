@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from casadi_hands.geometry.bodies import width_of
 from casadi_hands.kinematics.morphology import FingerSeed
 from casadi_hands.motion import linear
 from casadi_hands.nlp import Options, Parameter, Problem, Rows, Solution, Solver
@@ -81,7 +82,7 @@ class SynthesisStage:
         samples = len(target.collision_times(BETWEEN))
         for name in ("link_radius", "palm_radius", "shortest", "longest", "lowest", "highest", "margin"):
             problem.parameter(name, (1, 1))
-        problem.parameter("primitives", (samples, 7 * target.primitive_count))
+        problem.parameter("bodies", (samples, width_of(target.kinds)))
         problem.parameter("up", (samples, 3))
         problem.parameter("ground", (samples, 1))
 
@@ -112,11 +113,11 @@ class SynthesisStage:
         problem.bind(build(n), base=rows["base"], lengths=rows["lengths"], **limits)
         times = target.collision_times(BETWEEN)
         problem.bind(
-            collide(n, target.primitive_count),
+            collide(n, target.kinds),
             **constant(len(times)),
             angles=rows["angles"].combine(linear(target.times, times)),
             frames=frames,
-            **problem.given("link_radius", "palm_radius", "margin", "primitives", "up", "ground"),
+            **problem.given("link_radius", "palm_radius", "margin", "bodies", "up", "ground"),
         )
         idle = np.flatnonzero(~target.active[1:-1, c]) + 1
         if len(idle):
@@ -176,7 +177,7 @@ class SynthesisStage:
 
     def _parameters(self, seeds: tuple[FingerSeed, ...]) -> dict[str, Array | float]:
         target = self.target
-        primitives, up, ground = self._scene
+        bodies, up, ground = self._scene
         values: dict[str, Array | float] = {
             "link_radius": target.link_radius,
             "palm_radius": target.palm_radius,
@@ -185,7 +186,7 @@ class SynthesisStage:
             "lowest": target.joint_limits[0],
             "highest": target.joint_limits[1],
             "margin": MARGIN,
-            "primitives": primitives,
+            "bodies": bodies,
             "up": up,
             "ground": ground[:, None],
         }

@@ -8,7 +8,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from casadi_hands.geometry.contact_points import inward_normals, on_capsules
+from casadi_hands.geometry.bodies import Body, packed
+from casadi_hands.geometry.contact_points import inward_normals, on_bodies
 from casadi_hands.motion import catmull_rom, linear
 from casadi_hands.problem.floating_motion import Floating
 from casadi_hands.problem.model import Model, palm_from_world
@@ -62,9 +63,9 @@ class Target:
         return self.model.joint_limits
 
     @property
-    def primitive_count(self) -> int:
-        """Number of the object's capsules."""
-        return len(self.model.primitives)
+    def kinds(self) -> tuple[type[Body], ...]:
+        """What the object's bodies are."""
+        return self.model.kinds
 
     @property
     def tip_arc(self) -> float:
@@ -84,20 +85,19 @@ class Target:
         return self.model.schedule.between(between)
 
     def scene(self, times: Array) -> tuple[Array, Array, Array]:
-        """The object's capsules (T, 7K), the ground's normal (T, 3) and its offset (T,) in the palm frame."""
+        """Parameters of the object's bodies (T, W), the ground's normal (T, 3) and its offset (T,) in the palm frame."""
         model = self.model
         added = linear(model.schedule.samples, times) @ added_to_spline(model, 0)
         poses = catmull_rom(self.times, times) @ self.pose + added
-        primitives, up, offset = [], [], []
+        bodies, up, offset = [], [], []
         for time, pose in zip(times, poses, strict=True):
             rotation, position = palm_from_world(model, time)
             turn = rotation @ pin.exp3(pose[3:]) @ pin.Quaternion(*model.reference).matrix()
             center = rotation @ (pose[:3] - position)
-            moved = [np.concatenate([turn @ c[:3] + center, turn @ c[3:6] + center, c[6:]]) for c in model.primitives]
-            primitives.append(np.concatenate(moved))
+            bodies.append(packed([body.placed(turn, center) for body in model.bodies]))
             up.append(rotation[:, 2])
             offset.append(model.ground_height - position[2])
-        return np.array(primitives), np.array(up), np.array(offset)
+        return np.array(bodies), np.array(up), np.array(offset)
 
 
 def string_of(active: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -110,13 +110,14 @@ def string_of(active: NDArray[np.bool_]) -> NDArray[np.int64]:
 def target_of(model: Model, floating: Floating) -> Target:
     """See a floating motion from the palm; contact points are moved onto the object's surface."""
     schedule, contacts = model.schedule, model.contacts
+    touched = model.touched[:contacts]
     points, normals, forces, centers = [], [], [], []
     for k, sample in enumerate(schedule.keyframe_samples):
         rotation, position = palm_from_world(model, schedule.keyframes[k])
         pose = floating.pose[k]
         turn = rotation @ pin.exp3(pose[3:]) @ pin.Quaternion(*model.reference).matrix()
-        inward = inward_normals(floating.point[k, :contacts], model.capsules)
-        on_surface = on_capsules(floating.point[k, :contacts], model.capsules)
+        inward = inward_normals(floating.point[k, :contacts], touched)
+        on_surface = on_bodies(floating.point[k, :contacts], touched)
         center = rotation @ (pose[:3] - position)
         force = floating.force[sample, :contacts] * floating.active[k, :contacts, None]
         points.append(on_surface @ turn.T + center)

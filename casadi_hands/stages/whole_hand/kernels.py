@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 
 import casadi as ca
 from casadi import SX
 
-from casadi_hands.geometry import project_to_capsule
+from casadi_hands.geometry.bodies import Body, Surface, surfaces, width_of
+from casadi_hands.geometry.bodies.capsule import Segment
 from casadi_hands.kinematics.symbols import FingerSymbols, PlacedFinger, morphology
 from casadi_hands.motion import rotation_matrix
 from casadi_hands.motion.pose import placed
@@ -42,7 +44,8 @@ def touch(joints: int, moves: bool) -> Kernel:
     last = skeleton.origins[:, -1]
     on_link = ca.mtimes(skeleton.tip_rotation.T, in_palm - last)
     here = symbols.placed(angles, radius, on_link)
-    projection, normal, _ = project_to_capsule(on_link, SX.zeros(3, 1), ca.vertcat(0, 0, symbols.lengths[-1]), radius)
+    link = Surface(Segment(SX.zeros(3, 1), ca.vertcat(0, 0, symbols.lengths[-1])), radius)
+    projection, normal, _ = link.project(on_link)
     force_in_palm = palm.turned(ca.mtimes(rotation, force))
     kernel.cost(contact.CONTACT_ON_FINGER, contact.off_surface(force, activity, on_link, projection))
     position_before, quaternion_before = placed(pose_before, reference)
@@ -71,7 +74,7 @@ def move(joints: int) -> Kernel:
 
 
 @cache
-def object_clearance(joints: int, primitives: int, moves: bool) -> Kernel:
+def object_clearance(joints: int, kinds: tuple[type[Body], ...], moves: bool) -> Kernel:
     """One finger against object, palm, ground and itself at one sample (eq. 2.20)."""
     kernel = Kernel("object_clearance")
     pose, angles = kernel.variable("pose", 6), kernel.variable("angles", joints)
@@ -81,16 +84,14 @@ def object_clearance(joints: int, primitives: int, moves: bool) -> Kernel:
     radius, palm_radius, ground, margin = (
         kernel.parameter(name) for name in ("link_radius", "palm_radius", "ground_height", "margin")
     )
-    shapes = ca.reshape(kernel.parameter("all_primitives", 7 * primitives), 7, primitives)
+    bodies = surfaces(kinds, kernel.parameter("bodies", width_of(kinds)))
     position, quaternion = placed(pose, reference)
     rotation = rotation_matrix(quaternion)
 
-    def seen(end: SX) -> SX:
-        return palm.sees(position + ca.mtimes(rotation, end))
+    def seen(point: SX) -> SX:
+        return palm.sees(position + ca.mtimes(rotation, point))
 
-    in_palm = ca.horzcat(
-        *[ca.vertcat(seen(shapes[:3, k]), seen(shapes[3:6, k]), shapes[6, k]) for k in range(primitives)]
-    )
+    in_palm = [body.mapped(seen) for body in bodies]
     here = symbols.placed(angles, radius)
     up = palm.turned(SX([0, 0, 1]))
     apart, touching = distances(here, radius, palm_radius, in_palm, up, ground - palm.position[2])
@@ -99,7 +100,7 @@ def object_clearance(joints: int, primitives: int, moves: bool) -> Kernel:
 
 
 def distances(
-    here: PlacedFinger, radius: SX, palm_radius: SX, primitives: SX, up: SX | None, ground: SX
+    here: PlacedFinger, radius: SX, palm_radius: SX, bodies: Sequence[Surface], up: SX | None, ground: SX
 ) -> tuple[SX, SX]:
     """Distances between one finger and all but other fingers: those to keep apart, and the touching link's (K,).
 
@@ -110,8 +111,8 @@ def distances(
     if up is not None:
         apart.append(clearance.links_and_ground(ends, radius, up, ground))
     if len(ends) > 1:
-        apart.append(clearance.links_and_object(ends[:-1], radius, primitives))
-    return ca.vertcat(*apart), clearance.links_and_object(ends[-1:], radius, primitives)
+        apart.append(clearance.links_and_object(ends[:-1], radius, bodies))
+    return ca.vertcat(*apart), clearance.links_and_object(ends[-1:], radius, bodies)
 
 
 @cache

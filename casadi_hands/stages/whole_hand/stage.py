@@ -10,7 +10,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from casadi_hands.geometry.contact_points import on_capsules
+from casadi_hands.geometry.bodies import packed, width_of
 from casadi_hands.kinematics.morphology import FingerSeed
 from casadi_hands.kinematics.numeric import contact_kinematics
 from casadi_hands.nlp import Options, Parameter, Problem, Rows, Solution, Solver
@@ -20,6 +20,7 @@ from casadi_hands.problem.model import Model, palm_from_world, sampled_points, s
 from casadi_hands.problem.palm_motion import poses_at
 from casadi_hands.stages.object_motion.binding import ObjectSide, bind_object, declare_object
 from casadi_hands.stages.object_motion.values import object_parameters, pose_bounds, term_weights
+from casadi_hands.stages.own_terms import bind_own, contact_names
 from casadi_hands.stages.synthesis.stage import MARGIN
 from casadi_hands.stages.synthesis.target import string_of
 from casadi_hands.stages.whole_hand import kernels
@@ -58,7 +59,7 @@ class WholeHandStage:
         bind_object(problem, model, side, palm)
         for name in ("link_radius", "lowest", "highest", "margin"):
             problem.parameter(name, (1, 1))
-        problem.parameter("all_primitives", (1, 7 * len(model.primitives)))
+        problem.parameter("bodies", (1, width_of(model.kinds)))
         for name, width in (("palm_position", 3), ("palm_quaternion", 4)):
             problem.parameter(f"{name}_before", (samples, width), quantity=name, when=-1)
         for c, n in zip(contacts, joints, strict=True):
@@ -71,6 +72,9 @@ class WholeHandStage:
             three = [palm.take(np.clip(inner + offset, 0, keyframes - 1)) for offset in (-1, 0, 1)]
             step = problem.parameter("keyframe_step", (1, 1))
             problem.bind(kernels.palm_motion(), palm=three, keyframe_step=step)
+        rows = {"pose": side.pose[1], "point": side.point[1], "force": side.force, "activity": side.activity}
+        sampled = {c: each.combine(schedule.spline(), 0) for c, each in angles.items()}
+        bind_own(problem, model, "whole_hand", contact_names(model), sampled, **rows)
         self.solver = Solver(problem)
 
     def _bind_finger(self, side: ObjectSide, c: int, angles: Mapping[int, Rows], palm: Rows | None) -> None:
@@ -99,9 +103,9 @@ class WholeHandStage:
         )
         limits = problem.given("lowest", "highest", "step")
         problem.bind(kernels.move(joints[c]), angles=(before, now, after), **shape, **limits)
-        bodies = ("reference", "link_radius", "palm_radius", "ground_height", "margin", "all_primitives")
+        bodies = ("reference", "link_radius", "palm_radius", "ground_height", "margin", "bodies")
         problem.bind(
-            kernels.object_clearance(joints[c], len(model.primitives), self.palm_moves),
+            kernels.object_clearance(joints[c], model.kinds, self.palm_moves),
             pose=side.pose[1],
             angles=now,
             **moved,
@@ -160,8 +164,7 @@ class WholeHandStage:
                 pose = floating.pose[k]
                 turn = pin.exp3(pose[3:]) @ pin.Quaternion(*model.reference).matrix()
                 local = turn.T @ (rotation.T @ in_palm + position - pose[:3])
-                capsule = model.capsules[c : c + 1]
-                points[k, c] = on_capsules(local[None], capsule)[0]
+                points[k, c] = model.touched[c].on_surface(local)
         return points
 
     def _parameters(self, fingers: tuple[FingerSeed, ...]) -> dict[str, Array | float]:
@@ -172,7 +175,7 @@ class WholeHandStage:
             "lowest": model.joint_limits[0],
             "highest": model.joint_limits[1],
             "margin": MARGIN,
-            "all_primitives": model.primitives.reshape(1, -1),
+            "bodies": packed(model.bodies),
             "ground_height": model.ground_height,
         }
         before = model.palm_path.at(model.schedule.at(-1))

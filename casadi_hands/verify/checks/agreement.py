@@ -28,7 +28,7 @@ def object_problems(folder: Folder) -> list[str]:
             problems.append(f"inertia of the object: object.urdf and {source} disagree")
     if not np.all(np.abs(body.center_of_mass) <= 1e-6 * folder.length):
         problems.append("object.urdf: the link's frame is not the centre of mass")
-    shapes = [(*shape.segment, float(shape.radius)) for shape in task.object.shapes]
+    shapes = [_ends_and_radius(shape) for shape in task.object.shapes]
     if not all(any(is_capsule(capsule, *shape) for capsule in body.capsules) for shape in shapes):
         problems.append("shapes: object.urdf has not the shapes of task.yaml")
     if not all(any(is_capsule(capsule, *shape) for shape in shapes) for capsule in body.capsules):
@@ -41,6 +41,12 @@ def object_problems(folder: Folder) -> list[str]:
     elif not all(_is_stated(item, *shape) for item, shape in zip(listed, shapes, strict=True)):
         problems.append("shapes: those of result.json are not those of task.yaml")
     return problems
+
+
+def _ends_and_radius(shape: Any) -> tuple[np.ndarray, np.ndarray, float]:
+    """A task's primitive as both ends of its axis, (3,) m, and its radius, m."""
+    start, end = (shape.start, shape.end) if hasattr(shape, "start") else (shape.center, shape.center)
+    return np.array(start), np.array(end), float(shape.radius)
 
 
 def _is_stated(item: Any, start: np.ndarray, end: np.ndarray, radius: float) -> bool:

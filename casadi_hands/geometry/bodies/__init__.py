@@ -1,0 +1,14 @@
+"""The shapes of bodies, one class a module; each is found by its place in this folder."""
+
+from importlib import import_module
+from pkgutil import iter_modules
+
+from casadi_hands.geometry.bodies.body import Body, Core, Solid, Surface, packed, surfaces, width_of
+
+for _module in iter_modules(__path__):
+    import_module(f"{__name__}.{_module.name}")
+
+# By their names in task files.
+KINDS: dict[str, type[Body]] = {kind.kind: kind for kind in sorted(Body.__subclasses__(), key=lambda k: k.width)}
+
+__all__ = ["KINDS", "Body", "Core", "Solid", "Surface", "packed", "surfaces", "width_of"]

@@ -1,0 +1,207 @@
+"""What a body is: a convex core swept by a ball, in numbers and in symbols.
+
+To add a shape, add a module with one class to this folder: it is found by itself, and so is its place in task files.
+What a shape does not say raises ``NotImplementedError``.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, Literal, Self
+
+import numpy as np
+from casadi import SX
+from numpy.typing import NDArray
+
+from casadi_hands.geometry.smooth import norm
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A primitive that URDF, MJCF and the page know.
+
+    Attributes:
+        kind: ``sphere``, ``cylinder`` or ``capsule``.
+        start: (3,) one end of its axis, body frame; a sphere's centre.
+        end: (3,) the other end.
+        radius: of it.
+    """
+
+    kind: Literal["sphere", "cylinder", "capsule"]
+    start: Array
+    end: Array
+    radius: float
+
+
+class Core(ABC):
+    """A convex core in symbols; all in one frame."""
+
+    @abstractmethod
+    def offset(self, point: SX) -> SX:
+        """The vector (3,) to a point from the core's nearest one, smooth."""
+
+    @abstractmethod
+    def mapped(self, placed: Callable[[SX], SX]) -> Core:
+        """The core in another frame, of a rigid motion that takes each point (3,) there."""
+
+    @abstractmethod
+    def marks(self, up: SX) -> list[SX]:
+        """Points (3,) of the core whose distances from a disc with a normal (3,) stand for its own."""
+
+    @abstractmethod
+    def lowest(self, up: SX) -> list[SX]:
+        """Points (3,) of the core among which its lowest is, for a direction (3,) upward."""
+
+    def depth(self, point: SX) -> SX:
+        """How deep a point is within the core, zero outside: what its distance is continued by there."""
+        return SX(0)
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A body in symbols: a core and the radius of the ball that sweeps it."""
+
+    core: Core
+    radius: SX
+
+    def mapped(self, placed: Callable[[SX], SX]) -> Surface:
+        """The body in another frame, of a rigid motion that takes each point (3,) there."""
+        return Surface(self.core.mapped(placed), self.radius)
+
+    def distance_and_normal(self, point: SX, rounding: float = 1e-9) -> tuple[SX, SX]:
+        """Signed distance of a point (3,), negative inside, and the outward unit normal (3,) nearest to it."""
+        offset = self.core.offset(point)
+        distance = norm(offset, rounding)
+        return distance - self.core.depth(point) - self.radius, offset / distance
+
+    def project(self, point: SX) -> tuple[SX, SX, SX]:
+        """The nearest point (3,) of the surface, the outward unit normal there (3,), and the signed distance."""
+        offset = self.core.offset(point)
+        distance = norm(offset)
+        normal = offset / distance
+        outside = distance - self.core.depth(point)
+        return point + (self.radius - outside) * normal, normal, outside - self.radius
+
+
+@dataclass(frozen=True, eq=False)
+class Body(ABC):
+    """A body in numbers: lengths in any unit, in its object's frame.
+
+    Attributes:
+        kind: its name in task files.
+        width: number of parameters it packs into.
+    """
+
+    kind: ClassVar[str]
+    width: ClassVar[int]
+
+    @property
+    @abstractmethod
+    def ball(self) -> float:
+        """Radius of the ball that sweeps the core."""
+
+    @property
+    @abstractmethod
+    def parameters(self) -> Array:
+        """(width,) all that it is, as a kernel's parameters."""
+
+    @classmethod
+    @abstractmethod
+    def of(cls, parameters: Array) -> Self:
+        """The body of some parameters (width,)."""
+
+    @classmethod
+    @abstractmethod
+    def surface(cls, parameters: SX) -> Surface:
+        """The body of some parameters (width,) in symbols."""
+
+    @abstractmethod
+    def core_point(self, point: Array) -> Array:
+        """The point (3,) of the core nearest to a point (3,); nothing is rounded."""
+
+    def core_offset(self, point: Array) -> Array:
+        """The vector (3,) to a point from the core's nearest one; nothing is rounded."""
+        return point - self.core_point(point)
+
+    @abstractmethod
+    def support(self, direction: Array) -> Array:
+        """(K, 3) points of the core farthest in a direction (3,): corners of where all are equally far."""
+
+    @property
+    @abstractmethod
+    def volume(self) -> float:
+        """Of the solid."""
+
+    @property
+    @abstractmethod
+    def centroid(self) -> Array:
+        """Centre (3,) of the solid."""
+
+    @property
+    @abstractmethod
+    def unit_inertia(self) -> Array:
+        """Inertia (3, 3) of the solid with a mass of one about its centroid."""
+
+    @abstractmethod
+    def placed(self, rotation: Array, position: Array) -> Self:
+        """The same body turned by a rotation (3, 3), then shifted by (3,)."""
+
+    @abstractmethod
+    def edges(self) -> list[tuple[Array, Array]]:
+        """Segments of the core, end to end (3,) each, among which its point nearest to a disc is."""
+
+    @abstractmethod
+    def solids(self) -> tuple[Solid, ...]:
+        """What draws it."""
+
+    @property
+    @abstractmethod
+    def helper(self) -> Array:
+        """A direction (3,) across which tangents are well defined over most of the surface."""
+
+    def as_mapping(self) -> dict[str, Any]:
+        """Its fields by their names in task files."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
+
+    def has_normal(self, point: Array) -> bool:
+        """Whether one side of the surface is nearest to a point (3,), so that it has a normal there."""
+        return float(np.linalg.norm(self.core_offset(point))) >= 1e-6 * self.ball
+
+    def outward(self, point: Array) -> Array:
+        """Unit normal (3,), outward, at the surface nearest to a point (3,); zero on the core."""
+        away = self.core_offset(point)
+        return np.asarray(away / max(float(np.linalg.norm(away)), 1e-9))
+
+    def signed_distance(self, point: Array) -> float:
+        """Distance of a point (3,) from the surface, negative inside."""
+        return float(np.linalg.norm(self.core_offset(point))) - self.ball
+
+    def on_surface(self, point: Array) -> Array:
+        """A point (3,) moved along its normal onto the surface."""
+        return np.asarray(self.core_point(point) + self.ball * self.outward(point))
+
+    @property
+    def bounding_box(self) -> tuple[Array, Array]:
+        """Lower and upper corner, (3,) and (3,)."""
+        most = [np.array([self.support(sign * e)[0] @ e for e in np.eye(3)]) + sign * self.ball for sign in (-1, 1)]
+        return most[0], most[1]
+
+
+def surfaces(kinds: tuple[type[Body], ...], parameters: SX) -> list[Surface]:
+    """Bodies in symbols, of their parameters in one column."""
+    ends = np.cumsum([0, *[kind.width for kind in kinds]]).tolist()
+    return [kind.surface(parameters[a:b]) for kind, a, b in zip(kinds, ends, ends[1:], strict=False)]
+
+
+def width_of(kinds: tuple[type[Body], ...]) -> int:
+    """Number of parameters of several bodies."""
+    return sum(kind.width for kind in kinds)
+
+
+def packed(bodies: Sequence[Body]) -> Array:
+    """Parameters of several bodies in one row."""
+    return np.concatenate([body.parameters for body in bodies])
