@@ -76,7 +76,7 @@ def _check_owners(kernel: Kernel, given: Mapping[str, Argument]) -> None:
 
 
 def _check_order(kernel: Kernel, given: Mapping[str, Argument]) -> None:
-    """Of several of one quantity, those at later places are not earlier."""
+    """Of several of one quantity, those at later places are later."""
     marks: dict[str, list[tuple[int, float, str]]] = {}
     for local in kernel.locals.values():
         when = given[local.name].label.when
@@ -85,5 +85,5 @@ def _check_order(kernel: Kernel, given: Mapping[str, Argument]) -> None:
     for marked in marks.values():
         ordered = sorted(marked)
         for (_, before, first), (_, after, second) in zip(ordered, ordered[1:], strict=False):
-            if after < before:
-                raise ValueError(f"{kernel.name}.{second}: is earlier than {first}")
+            if after <= before:
+                raise ValueError(f"{kernel.name}.{second}: is not later than {first}")

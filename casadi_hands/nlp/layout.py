@@ -93,13 +93,14 @@ class Parameter:
             return self
         return Parameter(self.positions[np.asarray(indices, int)], replace(self.label, when=_mean(indices)))
 
-    def row(self, index: int) -> Parameter:
-        """One row, for all instances."""
-        return Parameter(self.positions[index : index + 1], self.label)
+    def entries(self, start: int, stop: int, owner: int | None = None) -> Parameter:
+        """Entries ``start`` to ``stop`` of every row, whose they are where they are somebody's."""
+        return Parameter(self.positions[:, start:stop], _owned(self.label, owner))
 
-    def entries(self, start: int, stop: int) -> Parameter:
-        """Entries ``start`` to ``stop`` of every row."""
-        return Parameter(self.positions[:, start:stop], self.label)
+
+def _owned(label: Label, owner: int | None) -> Label:
+    """A label with another owner, if one is given."""
+    return label if owner is None else replace(label, owner=owner)
 
 
 def _mean(indices: ArrayLike) -> float | None:
@@ -149,10 +150,10 @@ class Rows:
         label = replace(self.label, when=_mean(picked) if self.count > 1 else self.label.when)
         return Rows(self.matrix[rows], len(picked), self.width, self.offset[rows], label)
 
-    def entries(self, start: int, stop: int) -> Rows:
-        """Entries ``start`` to ``stop`` of every row."""
+    def entries(self, start: int, stop: int, owner: int | None = None) -> Rows:
+        """Entries ``start`` to ``stop`` of every row, whose they are where they are somebody's."""
         rows = (np.arange(self.count)[:, None] * self.width + np.arange(start, stop)).reshape(-1)
-        return Rows(self.matrix[rows], self.count, stop - start, self.offset[rows], self.label)
+        return Rows(self.matrix[rows], self.count, stop - start, self.offset[rows], _owned(self.label, owner))
 
     @classmethod
     def beside(cls, parts: Sequence[Rows]) -> Rows:

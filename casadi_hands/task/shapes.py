@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 from functools import cached_property, reduce
 from operator import or_
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import (
@@ -16,10 +16,11 @@ from pydantic import (
     Tag,
     create_model,
     model_serializer,
+    model_validator,
 )
 
 from casadi_hands.geometry.bodies import KINDS, Body
-from casadi_hands.task.fields import Positive, Section, Vector, vector
+from casadi_hands.task.fields import Positive, Section, Vector, refuse, vector
 
 
 class Primitive(Section):
@@ -31,6 +32,12 @@ class Primitive(Section):
         kind = KINDS[type(self).__name__.lower()]
         given = {name: getattr(self, name) for name in type(self).model_fields}
         return kind(**{name: np.array(v) if isinstance(v, tuple) else v for name, v in given.items()})
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        if allowed := self.body.impossible():
+            raise refuse(allowed)
+        return self
 
     @model_serializer(mode="wrap")
     def _tagged(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:

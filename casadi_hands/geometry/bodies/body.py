@@ -163,6 +163,10 @@ class Body(ABC):
     def helper(self) -> Array:
         """A direction (3,) across which tangents are well defined over most of the surface."""
 
+    def impossible(self) -> str:
+        """What is allowed instead, where no body is as these fields say; else empty."""
+        return ""
+
     def as_mapping(self) -> dict[str, Any]:
         """Its fields by their names in task files."""
         return {each.name: getattr(self, each.name) for each in fields(self)}

@@ -118,11 +118,11 @@ def _bind_scenario(problem: Problem, model: Model, side: ObjectSide, force: Rows
             kernels.contact_forces(type(body), suffix),
             {"in_cone": (0, np.inf)},
             f"contact{i}{suffix}",
-            force=force.entries(3 * i, 3 * i + 3),
-            activity=side.activity.entries(i, i + 1),
-            point=side.point[1].entries(3 * i, 3 * i + 3),
-            point_before=side.point[0].entries(3 * i, 3 * i + 3),
-            body=problem.parameter(f"body{i}{suffix}", (1, body.width), quantity="body"),
+            force=force.entries(3 * i, 3 * i + 3, i),
+            activity=side.activity.entries(i, i + 1, i),
+            point=side.point[1].entries(3 * i, 3 * i + 3, i),
+            point_before=side.point[0].entries(3 * i, 3 * i + 3, i),
+            body=problem.parameter(f"body{i}{suffix}", (1, body.width), quantity="body", owner=i),
             **problem.given("friction", "sharpness", "step"),
         )
     if model.ground is not None:
@@ -132,11 +132,11 @@ def _bind_scenario(problem: Problem, model: Model, side: ObjectSide, force: Rows
             {"in_cone": (0, np.inf)},
             pose=side.pose[1],
             pose_before=side.pose[0],
-            point=side.point[1].entries(3 * i, 3 * i + 3),
-            force=force.entries(3 * i, 3 * i + 3),
-            activity=side.activity.entries(i, i + 1),
-            body=problem.parameter(f"ground_body{suffix}", (1, body.width), quantity="body"),
-            friction=problem.parameter(f"ground_friction{suffix}", (1, 1), quantity="friction"),
+            point=side.point[1].entries(3 * i, 3 * i + 3, i),
+            force=force.entries(3 * i, 3 * i + 3, i),
+            activity=side.activity.entries(i, i + 1, i),
+            body=problem.parameter(f"ground_body{suffix}", (1, body.width), quantity="body", owner=i),
+            friction=problem.parameter(f"ground_friction{suffix}", (1, 1), quantity="friction", owner=i),
             **problem.given("reference", "ground_height", "sharpness", "step"),
         )
 
@@ -145,7 +145,7 @@ def _bind_points(problem: Problem, model: Model, side: ObjectSide) -> None:
     _, samples, contacts = sizes(model)
     patches = problem.parameter("patches", (samples, 3 * contacts), quantity="patch")
     for i in range(contacts):
-        span = 3 * i, 3 * i + 3
+        span = 3 * i, 3 * i + 3, i
         points = [points.entries(*span) for points in side.point]
         kernel = kernels.contact_motion()
         problem.bind(kernel, point=points, patch=patches.entries(*span), step=problem["step"])

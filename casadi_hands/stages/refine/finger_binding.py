@@ -16,7 +16,7 @@ def bind_contact(of: Declaration, i: int) -> None:
     structure = of.structure
     c, n, torque = structure.contacts[i], structure.joints[i], structure.model.torque_limit
     kind = type(structure.model.touched[c])
-    point, force = (rows.entries(3 * i, 3 * i + 3) for rows in (of.point, of.force))
+    point, force = (rows.entries(3 * i, 3 * i + 3, c) for rows in (of.point, of.force))
     # The torque is bound only where the task limits it.
     actuated = {**IN_CONE, "passive": FREE, "torque": (-torque, torque)}
     limited = bool(np.isfinite(torque))
@@ -50,7 +50,7 @@ def bind_contact(of: Declaration, i: int) -> None:
             pose=of.pose.take(knots),
             point=point.take(knots),
             angles=of.angles[i].take(knots),
-            force=of.force_disturbed.take(disturbed).entries(3 * i, 3 * i + 3),
+            force=of.force_disturbed.take(disturbed).entries(3 * i, 3 * i + 3, c),
             friction=of.problem["friction"],
             **of.scene(c, knots),
             **of.of(c, knots, "frames"),

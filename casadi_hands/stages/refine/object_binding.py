@@ -82,7 +82,7 @@ def bind_ground(of: Declaration) -> None:
     problem, structure = of.problem, of.structure
     friction = problem.parameter("ground_friction", (1, 1), quantity="friction")
     column, c = len(structure.contacts), structure.columns[-1]
-    span, kind = (3 * column, 3 * column + 3), type(structure.model.touched[c])
+    span, kind = (3 * column, 3 * column + 3, c), type(structure.model.touched[c])
     point, force = of.point.entries(*span), of.force.entries(*span)
     touching = np.flatnonzero(structure.touching[:, column])
     of.bind(

@@ -82,7 +82,7 @@ class WholeHandStage:
         problem, model, schedule = self.problem, self.model, self.model.schedule
         joints = dict(zip(self.contacts, self.joints, strict=True))
         before, now, after = (angles[c].combine(schedule.spline(offset), offset) for offset in (-1, 0, 1))
-        shape, span = self._morphology(c), (3 * c, 3 * c + 3)
+        shape, span = self._morphology(c), (3 * c, 3 * c + 3, c)
         given = problem.given("palm_position", "palm_quaternion", "palm_position_before", "palm_quaternion_before")
         moved = {} if palm is None else {"palm": palm.combine(schedule.spline(), 0)}
         moved_before = {} if palm is None else {"palm_before": palm.combine(schedule.spline(-1), -1)}
@@ -92,7 +92,7 @@ class WholeHandStage:
             pose_before=side.pose[0],
             point=side.point[1].entries(*span),
             force=side.force.entries(*span),
-            activity=side.activity.entries(c, c + 1),
+            activity=side.activity.entries(c, c + 1, c),
             angles=now,
             angles_before=before,
             **moved,
