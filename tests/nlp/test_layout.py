@@ -126,7 +126,6 @@ def test_parameters_read_take_and_split() -> None:
     for taken, expected, mark in (
         (target.take([2, 2, 0]), positions[[2, 2, 0]], Label("target", 1, 4 / 3)),
         (target.take([]), positions[:0], label),
-        (target.row(2), positions[[2]], label),
         (target.entries(1, 3), positions[:, 1:3], label),
         (target.take([1, 3]).entries(0, 1), positions[[1, 3], :1], Label("target", 1, 2.0)),
     ):
