@@ -59,9 +59,9 @@ def grips(model: Model, floating: Floating, friction: float | None = None) -> tu
         floating: the motion, with its contact points and flags.
         friction: of fingertips and object, in place of the task's; the ground keeps its own.
     """
-    mu = np.full(model.contacts, model.friction if friction is None else friction)
-    if model.ground is not None:
-        mu = np.append(mu, model.ground.friction)
+    mu = model.frictions
+    if friction is not None:
+        mu[: model.contacts] = friction
     found = []
     for needed, points, active in zip(
         needed_wrenches(model, floating.pose), floating.point, floating.active, strict=True

@@ -163,11 +163,9 @@ def _moved_palm(was: WholeHand, old: Model, model: Model) -> tuple[Array, Array]
 
 def _moved_points(points: Array, old: Model, model: Model) -> Array:
     """Contact points (S, C, 3) moved by what the task's contacts moved, on the object's surface as it is now."""
-    before = old.patches[[old.contact_names.index(name) for name in model.contact_names]]
-    patches = model.patches
-    if model.ground is not None and old.ground is not None:
-        patches, before = np.vstack([patches, model.ground.patch]), np.vstack([before, old.ground.patch])
-    moved = points + patches - before * (old.units.length / model.units.length)
+    names = [contact.name for contact in old.contact_table]
+    before = old.patches[[names.index(contact.name) for contact in model.contact_table]]
+    moved = points + model.patches - before * (old.units.length / model.units.length)
     return np.array([on_bodies(p, model.touched) for p in moved])
 
 

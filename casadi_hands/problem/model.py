@@ -10,29 +10,14 @@ from numpy.typing import NDArray
 
 from casadi_hands.geometry.bodies import Body
 from casadi_hands.motion import Schedule, held
+from casadi_hands.problem.contacts import Contact
 from casadi_hands.problem.palm_path import PalmPath
+from casadi_hands.problem.scenario import Scenario
 from casadi_hands.problem.units import Units
 from casadi_hands.terms.own import OwnTerm
 
 Array = NDArray[np.float64]
 _NO_GROUND = -1e3  # half extents
-
-
-@dataclass(frozen=True)
-class Ground:
-    """A horizontal plane.
-
-    Attributes:
-        height: of the plane.
-        friction: of plane and object.
-        patch: where on the object it may touch, (3,) object frame.
-        body: index of the object's body that it touches.
-    """
-
-    height: float
-    friction: float
-    patch: Array
-    body: int
 
 
 @dataclass(frozen=True)
@@ -58,11 +43,8 @@ class Model:
         gravity: (3,) weight in m·g.
         inertia: (3, 3) object frame, in m·length².
         bodies: whose union the object is, object frame.
-        contact_names: of the C contacts.
-        patches: (C, 3) the user's contact points, object frame.
-        contact_bodies: (C,) index of the body that each contact lies on.
-        friction: of fingertip and object.
-        ground: or None.
+        contact_table: of all contacts, the C fingers' first, then the ground's, if there is one.
+        ground: its height, or None.
         palm_radius: of the disc.
         palm_position: (S, 3) world, at the samples.
         palm_quaternion: (S, 4) world from palm, [w, x, y, z].
@@ -74,8 +56,7 @@ class Model:
         slip_tolerance: half extents, a part of the task's limit that a contact may slip from touch to lift.
         reference: (4,) quaternion of the reference orientation.
         tool: (3,) object frame, or None when goals are poses.
-        disturbance_force: (S, 3) m·g, world.
-        disturbance_torque: (S, 3) m·g·length, world.
+        scenarios: the motion as planned, and if the task disturbs it, the same with what does.
         link_radius: of all links.
         link_length: shortest and longest link.
         joint_limits: lower and upper, rad.
@@ -90,11 +71,8 @@ class Model:
     gravity: Array
     inertia: Array
     bodies: tuple[Body, ...]
-    contact_names: tuple[str, ...]
-    patches: Array
-    contact_bodies: tuple[int, ...]
-    friction: float
-    ground: Ground | None
+    contact_table: tuple[Contact, ...]
+    ground: float | None
     palm_radius: float
     palm_position: Array
     palm_quaternion: Array
@@ -106,8 +84,7 @@ class Model:
     slip_tolerance: float
     reference: Array
     tool: Array | None
-    disturbance_force: Array
-    disturbance_torque: Array
+    scenarios: tuple[Scenario, ...]
     link_radius: float
     link_length: tuple[float, float]
     joint_limits: tuple[float, float]
@@ -115,6 +92,11 @@ class Model:
     speed_limit: float
     regrasp: Regrasp | None = None
     own_terms: tuple[OwnTerm, ...] = ()
+
+    @property
+    def contact_names(self) -> tuple[str, ...]:
+        """Names of the finger contacts."""
+        return tuple(contact.name for contact in self.contact_table if contact.finger)
 
     @property
     def contacts(self) -> int:
@@ -129,30 +111,34 @@ class Model:
     @property
     def touched(self) -> tuple[Body, ...]:
         """The body that each contact lies on, the ground's contact, if any, last."""
-        chosen = [*self.contact_bodies, *([] if self.ground is None else [self.ground.body])]
-        return tuple(self.bodies[body] for body in chosen)
+        return tuple(self.bodies[contact.body] for contact in self.contact_table)
+
+    @property
+    def friction(self) -> float:
+        """Of fingertips and object."""
+        return self.contact_table[0].friction
 
     @property
     def frictions(self) -> Array:
         """Friction of each contact, the ground's, if any, last."""
-        return np.append(np.full(self.contacts, self.friction), [] if self.ground is None else [self.ground.friction])
+        return np.array([contact.friction for contact in self.contact_table])
 
     @property
-    def all_patches(self) -> Array:
+    def patches(self) -> Array:
         """Where contacts are wanted, the ground's, if any, last; (C, 3) object frame."""
-        return self.patches if self.ground is None else np.vstack([self.patches, self.ground.patch])
+        return np.array([contact.patch for contact in self.contact_table])
 
     @property
     def keyframe_patches(self) -> Array:
         """(N, C, 3) where contacts are wanted at the keyframes, object frame; the ground's, if any, last."""
         if self.regrasp is not None:
             return self.regrasp.patches
-        return np.tile(self.all_patches, (len(self.schedule.keyframes), 1, 1))
+        return np.tile(self.patches, (len(self.schedule.keyframes), 1, 1))
 
     @property
     def ground_height(self) -> float:
         """Of the ground, or a height that no object reaches where there is none."""
-        return _NO_GROUND if self.ground is None else self.ground.height
+        return _NO_GROUND if self.ground is None else self.ground
 
     def slides(self, contact: int) -> bool:
         """Whether a finger's contact is planned to move on the object without lifting."""
@@ -191,9 +177,9 @@ class Model:
         return np.hstack([self.goal_positions, self.goal_vectors])
 
     @property
-    def disturbed(self) -> bool:
-        """Whether the task asks for a second scenario with external wrenches."""
-        return bool(np.any(self.disturbance_force) or np.any(self.disturbance_torque))
+    def disturbance(self) -> Scenario | None:
+        """The scenario in which something acts from outside; None where the task asks for none."""
+        return self.scenarios[1] if len(self.scenarios) > 1 else None
 
 
 def palm_from_world(model: Model, time: float) -> tuple[Array, Array]:

@@ -58,7 +58,7 @@ def whole_hand_motion(model: Model, result: WholeHand) -> Motion:
         on_link[:, contact] = on_bodies(local, [link] * count)
     if model.ground is not None:
         on_link[:, -1] = in_world(model, result, point[:, -1])
-        on_link[:, -1, 2] = model.ground.height
+        on_link[:, -1, 2] = model.ground
     angles = np.hstack(result.angles) if result.angles else np.zeros((count, 0))
     joint_names = tuple(f"finger{i}_joint{j}" for i, f in enumerate(result.fingers) for j in range(f.joints))
     object_pose, palm = (result.position, result.vector), (result.palm_position, result.palm_quaternion)
@@ -66,12 +66,13 @@ def whole_hand_motion(model: Model, result: WholeHand) -> Motion:
     contacts = tuple(names[c] for c in touch), [links[c] for c in touch]
     active, force, point, on_link = result.active[:, touch], result.force[:, touch], point[:, touch], on_link[:, touch]
     motion = motion_in_si(model, *object_pose, *palm, angles, joint_names, *contacts, active, force, point, on_link)
-    if result.disturbed is None:
+    disturbance = model.disturbance
+    if result.disturbed is None or disturbance is None:
         return motion
     rotations = np.array([object_rotation(model, v) for v in result.vector])
     return replace(
         motion,
         contact_force_disturbed=np.einsum("sij,scj->sci", rotations, result.disturbed[:, touch]) * model.units.force,
-        external_force_disturbed=model.disturbance_force * model.units.force,
-        external_torque_disturbed=model.disturbance_torque * model.units.torque,
+        external_force_disturbed=disturbance.force * model.units.force,
+        external_torque_disturbed=disturbance.torque * model.units.torque,
     )

@@ -13,6 +13,7 @@ from casadi_hands.motion import Schedule, catmull_rom, continuous, held, linear,
 from casadi_hands.problem.hand_motion import WholeHand, turned
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.palm_motion import carried_by_palm, goals_seen_from_palm, stands
+from casadi_hands.problem.scenario import Scenario
 
 Array = NDArray[np.float64]
 
@@ -20,21 +21,23 @@ Array = NDArray[np.float64]
 def resampled_model(model: Model, schedule: Schedule) -> Model:
     """The task with other samples between the same keyframes.
 
-    A perturbation lasts to the next of its own samples; of those that act before the next knot a knot has the largest.
+    A disturbance lasts to the next of its own samples; of those that act before the next knot a knot has the largest.
     """
     was, now = model.schedule.samples, schedule.samples
     first = held(was, now)
     end = np.append(np.searchsorted(was, now[1:] - 1e-9), len(was))
-    size = np.linalg.norm(np.hstack([model.disturbance_force, model.disturbance_torque]), axis=1)
-    largest = np.array([i + np.argmax(size[i : max(i + 1, j)]) for i, j in zip(first, end, strict=True)])
+
+    def coarser(scenario: Scenario) -> Scenario:
+        size = np.linalg.norm(np.hstack([scenario.force, scenario.torque]), axis=1)
+        return scenario.at(np.array([i + np.argmax(size[i : max(i + 1, j)]) for i, j in zip(first, end, strict=True)]))
+
     palm = model.palm_path.at(now)
     return replace(
         model,
         schedule=schedule,
         palm_position=palm[:, :3],
         palm_quaternion=palm[:, 3:],
-        disturbance_force=model.disturbance_force[largest],
-        disturbance_torque=model.disturbance_torque[largest],
+        scenarios=tuple(map(coarser, model.scenarios)),
     )
 
 

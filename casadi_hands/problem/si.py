@@ -14,9 +14,10 @@ from casadi_hands.kinematics import STAND
 from casadi_hands.kinematics.morphology import FingerSeed, frame_about
 from casadi_hands.motion import Schedule, continuous
 from casadi_hands.motion.quaternion import quaternion
+from casadi_hands.problem.contacts import Contact
 from casadi_hands.problem.hand import Finger, Hand, Link
 from casadi_hands.problem.hand_motion import WholeHand
-from casadi_hands.problem.model import Ground, Model
+from casadi_hands.problem.model import Model
 from casadi_hands.problem.motion import Motion
 from casadi_hands.problem.palm_path import PalmPath
 from casadi_hands.problem.placement import (
@@ -25,6 +26,7 @@ from casadi_hands.problem.placement import (
     turned_to_palm,
     turned_to_world,
 )
+from casadi_hands.problem.scenario import Scenario, planned
 from casadi_hands.problem.units import STANDARD_GRAVITY, Units, round_off
 from casadi_hands.task import Task
 
@@ -44,16 +46,9 @@ def build_model(task: Task) -> Model:
     goal_times = [goal.at for goal in task.motion]
     schedule = Schedule.of(goal_times, task.duration, task.keyframes_between, task.time_step, times)
     bodies = tuple(type(s.body).of(round_off(s.body.parameters / length)) for s in task.object.shapes)
-    patches = np.array([finger.touches for finger in task.fingers.values()]) / length
     positions, vectors, reference = _goals(task)
     palm_path = PalmPath(np.array(times), round_off(np.array(places) / length), np.array(turns))
     palm = palm_path.at(schedule.samples)
-    forces, torques = _perturbations(task, schedule)
-    ground = None
-    if task.ground is not None:
-        patch = np.asarray(task.ground.touches, float) / length
-        height = round_off(task.ground.height / length)
-        ground = Ground(height, task.ground.friction, round_off(patch), _nearest_body(patch, bodies))
     actuator = task.actuator
     low, high = task.hand.joint_limits
     return Model(
@@ -62,11 +57,8 @@ def build_model(task: Task) -> Model:
         gravity=round_off(np.asarray(task.gravity) / acceleration),
         inertia=round_off(np.asarray(task.object.inertia) / (task.object.mass * length**2)),
         bodies=bodies,
-        contact_names=tuple(task.fingers),
-        patches=round_off(patches),
-        contact_bodies=tuple(_nearest_body(p, bodies) for p in patches),
-        friction=task.friction,
-        ground=ground,
+        contact_table=_contacts(task, bodies, length),
+        ground=None if task.ground is None else round_off(task.ground.height / length),
         palm_radius=round_off(task.palm.radius / length),
         palm_position=palm[:, :3],
         palm_quaternion=palm[:, 3:],
@@ -81,14 +73,26 @@ def build_model(task: Task) -> Model:
         slip_tolerance=round_off(min(0.2 * task.limits.slip / length, _MOST_SLIP)),
         reference=reference,
         tool=None if not task.draws else round_off(np.asarray(task.tool) / length),
-        disturbance_force=round_off(forces / units.force),
-        disturbance_torque=round_off(torques / units.torque),
+        scenarios=_scenarios(task, schedule, units),
         link_radius=round_off(task.hand.link_radius / length),
         link_length=(round_off(task.hand.link_length[0] / length), round_off(task.hand.link_length[1] / length)),
         joint_limits=(math.radians(low), math.radians(high)),
         torque_limit=math.inf if actuator is None else round_off(actuator.torque / units.torque),
         speed_limit=math.inf if actuator is None else actuator.speed,
     )
+
+
+def _contacts(task: Task, bodies: Sequence[Body], length: float) -> tuple[Contact, ...]:
+    """The fingers' contacts, then the ground's."""
+    found = []
+    for name, finger in task.fingers.items():
+        patch = np.array(finger.touches) / length
+        found.append(Contact(name, round_off(patch), _nearest_body(patch, bodies), task.friction))
+    if task.ground is not None:
+        patch = np.asarray(task.ground.touches, float) / length
+        body = _nearest_body(patch, bodies)
+        found.append(Contact("ground", round_off(patch), body, task.ground.friction, finger=False))
+    return tuple(found)
 
 
 def _nearest_body(point: Array, bodies: Sequence[Body]) -> int:
@@ -105,16 +109,17 @@ def _goals(task: Task) -> tuple[Array, Array, Array]:
     return positions, task.goal_turns(), quaternion(task.motion[0].rotation.matrix)
 
 
-def _perturbations(task: Task, schedule: Schedule) -> tuple[Array, Array]:
-    """External force (S, 3) in N and torque (S, 3) in N·m at the samples."""
+def _scenarios(task: Task, schedule: Schedule, units: Units) -> tuple[Scenario, ...]:
+    """The motion as planned and, if the task disturbs it, the same with the forces and torques that do."""
     forces, torques = np.zeros((2, len(schedule.samples), 3))
-    for push in task.perturbations:
-        during = (schedule.samples >= push.start - 1e-9) & (schedule.samples <= push.end + 1e-9)
+    for each in task.perturbations:
+        during = (schedule.samples >= each.start - 1e-9) & (schedule.samples <= each.end + 1e-9)
         if not during.any():  # a short one between two samples
-            during[np.argmin(np.abs(schedule.samples - (push.start + push.end) / 2))] = True
-        forces[during] += np.asarray(push.force)
-        torques[during] += np.asarray(push.torque)
-    return forces, torques
+            during[np.argmin(np.abs(schedule.samples - (each.start + each.end) / 2))] = True
+        forces[during] += np.asarray(each.force)
+        torques[during] += np.asarray(each.torque)
+    disturbed = Scenario("_perturbed", round_off(forces / units.force), round_off(torques / units.torque))
+    return planned(len(schedule.samples)), *([disturbed] if disturbed.acts.any() else [])
 
 
 _RESERVE = 1.5  # of torque and speed limits over what the motion uses, where the task names no actuator

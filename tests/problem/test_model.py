@@ -63,8 +63,8 @@ def test_every_number_is_the_task_s_over_its_unit() -> None:
     assert model.speed_limit == 6
     assert model.friction == 0.6
     assert model.ground is not None
-    assert model.ground.height * length == pytest.approx(0.001)
-    assert model.ground.friction == 0.4
+    assert model.ground * length == pytest.approx(0.001)
+    assert model.frictions[-1] == 0.4
     # The thumb and the index are on the capsule, the top finger on the sphere.
     np.testing.assert_array_equal(model.capsules, model.primitives[[0, 0, 1]])
 
@@ -146,7 +146,7 @@ def test_a_perturbation_between_two_samples_acts_at_the_nearest() -> None:
     task = parse_task(text)
     assert task.perturbations[0].end == 0.36
     model = build_model(task)
-    pushed = model.schedule.samples[model.disturbance_torque.any(axis=1)]
+    pushed = model.schedule.samples[model.disturbance.torque.any(axis=1)]
     (nearest,) = pushed
     assert abs(nearest - 0.345) == np.abs(model.schedule.samples - 0.345).min()
 
@@ -155,13 +155,13 @@ def test_perturbations_act_in_their_time_and_add_up() -> None:
     _, model = everything()
     weight = 0.2 * 9.81
     for time, force, torque in zip(
-        model.schedule.samples, model.disturbance_force, model.disturbance_torque, strict=True
+        model.schedule.samples, model.disturbance.force, model.disturbance.torque, strict=True
     ):
         first, second = 0.3 - 1e-6 <= time <= 0.9 + 1e-6, 0.5 - 1e-6 <= time <= 0.7 + 1e-6
         expected = first * np.array([0.3, 0, -0.5]) + second * np.array([0, 0.2, 0])
         np.testing.assert_allclose(force * weight, expected, atol=1e-12)
         np.testing.assert_allclose(torque * weight * 0.0475, first * np.array([0, 0.004, 0]), atol=1e-12)
-    assert model.disturbed
+    assert model.disturbance is not None
 
 
 def test_a_drawing_has_points_for_goals() -> None:

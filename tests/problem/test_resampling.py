@@ -12,6 +12,7 @@ from casadi_hands.motion import Schedule
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.resampling import at_rest, extrapolated, resampled, resampled_model, shortened
+from casadi_hands.problem.scenario import Scenario
 from tests.stages.example import everything, project, standing
 from tests.stages.refining import carrying
 
@@ -47,9 +48,14 @@ def test_a_task_at_fewer_samples_has_the_same_palm_and_pushes_there() -> None:
         if abs(model.schedule.samples[at] - time) < 1e-9:
             np.testing.assert_allclose(fewer.palm_position[k], model.palm_position[at], atol=1e-12)
             np.testing.assert_allclose(fewer.palm_quaternion[k], model.palm_quaternion[at], atol=1e-12)
-            np.testing.assert_array_equal(fewer.disturbance_force[k], model.disturbance_force[at])
-    assert fewer.disturbance_force.any()
+            np.testing.assert_array_equal(disturbance(fewer).force[k], model.disturbance.force[at])
+    assert disturbance(fewer).force.any()
     np.testing.assert_allclose(np.linalg.norm(fewer.palm_quaternion, axis=1), 1, atol=1e-12)
+
+
+def disturbance(model: Model) -> Scenario:
+    assert model.disturbance is not None
+    return model.disturbance
 
 
 def test_no_push_is_lost_between_knots_and_of_two_the_larger_is_kept() -> None:
@@ -58,19 +64,19 @@ def test_no_push_is_lost_between_knots_and_of_two_the_larger_is_kept() -> None:
     push, twist = np.zeros((len(samples), 3)), np.zeros((len(samples), 3))
     # Sample by sample one that no knot falls into, one at a knot, and two before the same next knot.
     push[2], push[6], push[11], twist[12] = [0, 0, 1], [0, 2, 0], [3, 0, 0], [0, 0, 4]
-    pushed = replace(model, disturbance_force=push, disturbance_torque=twist)
+    pushed = replace(model, scenarios=(model.scenarios[0], Scenario("_perturbed", push, twist)))
     knots = np.array([0, 1, 3, 6, 7, 9, 13])
     schedule = replace(model.schedule, samples=samples[[*knots, *range(14, len(samples))]])
     fewer = resampled_model(pushed, schedule)
     wanted = {1: push[2], 3: push[6]}
     for k in range(len(schedule.samples)):
-        np.testing.assert_array_equal(fewer.disturbance_force[k], wanted.get(k, np.zeros(3)), str(k))
-    np.testing.assert_array_equal(fewer.disturbance_torque[5], twist[12])
-    assert np.count_nonzero(fewer.disturbance_torque.any(axis=1)) == 1
+        np.testing.assert_array_equal(disturbance(fewer).force[k], wanted.get(k, np.zeros(3)), str(k))
+    np.testing.assert_array_equal(disturbance(fewer).torque[5], twist[12])
+    assert np.count_nonzero(disturbance(fewer).torque.any(axis=1)) == 1
     # At its own samples the task stays what it is; in halved intervals a push lasts to its next sample.
-    np.testing.assert_array_equal(resampled_model(pushed, model.schedule).disturbance_force, push)
+    np.testing.assert_array_equal(disturbance(resampled_model(pushed, model.schedule)).force, push)
     halved = resampled_model(pushed, model.schedule.halved(np.ones(len(samples) - 1, bool)))
-    np.testing.assert_array_equal(halved.disturbance_force, np.repeat(push, 2, axis=0)[:-1])
+    np.testing.assert_array_equal(disturbance(halved).force, np.repeat(push, 2, axis=0)[:-1])
 
 
 def test_a_smooth_motion_comes_back_from_fewer_samples(start: WholeHand) -> None:

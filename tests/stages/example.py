@@ -86,13 +86,13 @@ def made_up_values(model: Model, seed: int = 0) -> dict[str, Array]:
     rng = np.random.default_rng(seed)
     keyframes, samples = len(model.schedule.keyframes), len(model.schedule.samples)
     contacts = model.contacts + (model.ground is not None)
-    patches = model.patches if model.ground is None else np.vstack([model.patches, model.ground.patch])
+    patches = model.patches
     return {
         "pose": np.hstack([rng.uniform(-0.6, 0.9, (keyframes, 3)), rng.uniform(-1.2, 1.2, (keyframes, 3))]),
         "point": (patches + 0.1 * rng.normal(size=(keyframes, contacts, 3))).reshape(keyframes, -1),
         "force": rng.normal(size=(samples, 3 * contacts)),
         "activity": rng.uniform(0.1, 0.9, (keyframes, contacts)),
-        **({"force_perturbed": rng.normal(size=(samples, 3 * contacts))} if model.disturbed else {}),
+        **({"force_perturbed": rng.normal(size=(samples, 3 * contacts))} if model.disturbance is not None else {}),
     }
 
 

@@ -23,7 +23,7 @@ _GATE = 0.05  # m·g, unbalanced wrench that the gate lets pass: what the soft s
 
 def least_squares_forces(model: Model, rotation: Array) -> Array:
     """Contact forces (C, 3) in the object's frame that hold its weight: a normal preload, corrected to balance."""
-    points = model.all_patches
+    points = model.patches
     preload = _PRELOAD * inward_normals(points, model.touched)
     grasp = grasp_map(points)
     missing = np.concatenate([-rotation.T @ model.gravity, np.zeros(3)]) - grasp @ preload.reshape(-1)

@@ -77,8 +77,8 @@ class FloatingStage:
             "force": force.reshape(samples, -1),
             "activity": np.full((keyframes, contacts), 0.9),
         }
-        if model.disturbed:
-            start["force_perturbed"] = start["force"]
+        for scenario in model.scenarios[1:]:
+            start[f"force{scenario.suffix}"] = start["force"]
         return start
 
     def solve(self, weights: Mapping[str, float]) -> Floating:

@@ -23,8 +23,7 @@ class ObjectSide:
     Attributes:
         pose: (S, 6) at time offsets of -1, 0 and +1 steps.
         point: (S, 3C) contact points at the same offsets, object frame.
-        force: (S, 3C) in the object's frame, at every sample a variable of its own.
-        disturbed: (S, 3C) forces of the second scenario, or None.
+        forces: of each scenario (S, 3C) in the object's frame, at every sample a variable of its own.
         activity: (S, C) contact invariants, held from each keyframe to the next.
         keyframe_pose: (N, 6).
         keyframe_activity: (N, C).
@@ -32,25 +31,29 @@ class ObjectSide:
 
     pose: tuple[Rows, Rows, Rows]
     point: tuple[Rows, Rows, Rows]
-    force: Rows
-    disturbed: Rows | None
+    forces: tuple[Rows, ...]
     activity: Rows
     keyframe_pose: Rows
     keyframe_activity: Rows
 
+    @property
+    def force(self) -> Rows:
+        """Forces of the motion as planned."""
+        return self.forces[0]
+
 
 def declare_object(problem: Problem, model: Model) -> ObjectSide:
-    """Declare ``pose`` (N, 6), ``point`` (N, 3C), ``force`` (S, 3C), ``activity`` (N, C), ``force_perturbed``."""
+    """Declare ``pose`` (N, 6), ``point`` (N, 3C), ``force`` (S, 3C), ``activity`` (N, C), and other scenarios' forces."""
     schedule = model.schedule
     keyframes, samples, contacts = sizes(model)
     pose = problem.variable("pose", (keyframes, 6), *pose_bounds(model))
     point = problem.variable("point", (keyframes, 3 * contacts))
     force = problem.variable("force", (samples, 3 * contacts), -MOST_FORCE, MOST_FORCE)
     activity = problem.variable("activity", (keyframes, contacts), 0, 1)
-    disturbed = None
-    if model.disturbed:
-        limits = -MOST_FORCE, MOST_FORCE
-        disturbed = problem.variable("force_perturbed", (samples, 3 * contacts), *limits, quantity="force")
+    disturbed = [
+        problem.variable(f"force{each.suffix}", (samples, 3 * contacts), -MOST_FORCE, MOST_FORCE, quantity="force")
+        for each in model.scenarios[1:]
+    ]
 
     def poses(offset: int) -> Rows:
         return pose.combine(schedule.spline(offset), offset).plus(added_to_spline(model, offset))
@@ -58,8 +61,7 @@ def declare_object(problem: Problem, model: Model) -> ObjectSide:
     return ObjectSide(
         pose=(poses(-1), poses(0), poses(1)),
         point=(_points(model, point, -1), _points(model, point, 0), _points(model, point, 1)),
-        force=force,
-        disturbed=disturbed,
+        forces=(force, *disturbed),
         activity=activity.take(schedule.sample_keyframes),
         keyframe_pose=pose,
         keyframe_activity=activity,
@@ -85,16 +87,15 @@ def bind_object(problem: Problem, model: Model, side: ObjectSide, palm: Rows | N
         problem.parameter(name, (1, width))
     for name in ("friction", "sharpness", "clearance", "ground_height"):
         problem.parameter(name, (1, 1))
-    _bind_scenario(problem, model, side, side.force, "")
-    if side.disturbed is not None:
-        _bind_scenario(problem, model, side, side.disturbed, "_perturbed")
+    for scenario, force in zip(model.scenarios, side.forces, strict=True):
+        _bind_scenario(problem, model, side, force, scenario.suffix)
     _bind_points(problem, model, side)
     _bind_goals(problem, model, side)
     _bind_clearance(problem, model, side, palm)
 
 
 def _bind_scenario(problem: Problem, model: Model, side: ObjectSide, force: Rows, suffix: str) -> None:
-    """Physics and contact forces, without and with the task's disturbances."""
+    """Physics and contact forces of one scenario; only the first pays for the motion, which all share."""
     samples, contacts = sizes(model)[1:]
     external = {
         f"external_{kind}": problem.parameter(

@@ -69,13 +69,10 @@ def pose_bounds(model: Model) -> tuple[Array, Array]:
 
 def object_parameters(model: Model) -> dict[str, Array | float]:
     """Values of all parameters of the object's side but the weights."""
-    ground = model.ground
     values: dict[str, Array | float] = {
         "reference": model.reference,
         "step": model.schedule.step,
         "gravity": model.gravity,
-        "external_force": 0.0,
-        "external_torque": 0.0,
         "inertia": model.inertia.reshape(1, 9),
         "inertial": model.units.inertial,
         "friction": model.friction,
@@ -94,15 +91,19 @@ def object_parameters(model: Model) -> dict[str, Array | float]:
         values["tool"], values["targets"] = model.tool, tool_path(model)
     else:
         values["vectors"] = model.goal_vectors
-    for suffix in ("", "_perturbed") if model.disturbed else ("",):
+    for scenario in model.scenarios:
+        suffix = scenario.suffix
         for i, body in enumerate(model.touched[: model.contacts]):
             values[f"body{i}{suffix}"] = body.parameters
-        if ground is not None:
+        if model.ground is not None:
             values[f"ground_body{suffix}"] = model.touched[-1].parameters
-            values[f"ground_friction{suffix}"] = ground.friction
-    if model.disturbed:
-        values["external_force_perturbed"] = model.disturbance_force
-        values["external_torque_perturbed"] = model.disturbance_torque
+            values[f"ground_friction{suffix}"] = float(model.frictions[-1])
+        # Of the motion as planned all rows are the same.
+        rows = slice(None) if suffix else slice(1)
+        values[f"external_force{suffix}"], values[f"external_torque{suffix}"] = (
+            scenario.force[rows],
+            scenario.torque[rows],
+        )
     return values
 
 

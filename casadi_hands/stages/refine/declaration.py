@@ -156,4 +156,4 @@ class Declaration:
 
 def disturbed_knots(model: Model) -> Knots:
     """Knots at which the task's disturbances act."""
-    return np.flatnonzero(np.any(np.hstack([model.disturbance_force, model.disturbance_torque]), axis=1))
+    return np.flatnonzero(model.disturbance.acts) if model.disturbance else np.zeros(0, int)

@@ -100,7 +100,7 @@ def bind_clearance(of: Declaration, i: int) -> None:
     """A finger clear of palm, ground, itself and the object, but for what its last link touches."""
     structure, model = of.structure, of.structure.model
     c, n = structure.contacts[i], structure.joints[i]
-    touched = model.contact_bodies[c]
+    touched = model.contact_table[c].body
     touching, idle = structure.touching[:, i], np.flatnonzero(~structure.active[:-1, i])
 
     def bind(

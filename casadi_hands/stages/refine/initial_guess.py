@@ -40,7 +40,8 @@ def rates_and_wrenches(model: Model, position: Array, vector: Array) -> tuple[Ar
 
 def perturbations(model: Model, vector: Array) -> Array:
     """The task's perturbing force and torque (S, 6) in the frame of an object with rotation vectors (S, 3)."""
-    both = model.disturbance_force, model.disturbance_torque
+    assert model.disturbance is not None
+    both = model.disturbance.force, model.disturbance.torque
     return np.hstack([np.einsum("sij,sj->si", _to_object(model, vector), each) for each in both])
 
 

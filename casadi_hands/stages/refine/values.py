@@ -174,15 +174,15 @@ class RefineValues:
         }
         values |= self.proximity.idle
         values |= own_values(self.problem, model)
-        if len(self.disturbed):
-            values["external_force"] = model.disturbance_force[self.disturbed]
-            values["external_torque"] = model.disturbance_torque[self.disturbed]
+        if model.disturbance is not None and len(self.disturbed):
+            values["external_force"] = model.disturbance.force[self.disturbed]
+            values["external_torque"] = model.disturbance.torque[self.disturbed]
         if model.tool is None:
             values["goals"] = model.goal_poses
         else:
             values["tool"], values["tool_path"] = model.tool, tool_path(model)
         if self.structure.grounded and model.ground is not None:
-            values["ground_friction"] = margin.friction * model.ground.friction
+            values["ground_friction"] = margin.friction * model.frictions[-1]
         for c in self.structure.columns:
             values[f"wanted_point{c}"], values[f"wanted_force{c}"] = wanted.point[:, c], wanted.force[:, c]
             values[f"body{c}"] = model.touched[c].parameters

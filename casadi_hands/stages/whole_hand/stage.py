@@ -29,7 +29,6 @@ Array = NDArray[np.float64]
 # The start is near what is wanted: a small barrier, and no push away from bounds, halve the iterations of a large one.
 OPTIONS = Options(mu_init=1e-3, extra=(("bound_push", 1e-4), ("bound_frac", 1e-4)))
 BROKEN = 1e-2  # violation of a solve that lost its way, from which another barrier leads elsewhere
-_FORCES = "force", "force_perturbed"
 FARTHEST_PALM = 2.0  # half extents and rad, how far a palm that may move leaves its given motion
 
 
@@ -142,8 +141,9 @@ class WholeHandStage:
             "activity": flags,
             **{f"angles{c}": f.angles for c, f in zip(self.contacts, fingers, strict=True)},
         }
-        if model.disturbed:
-            start["force_perturbed"] = floating.solution.values["force_perturbed"]
+        for scenario in model.scenarios[1:]:
+            name = f"force{scenario.suffix}"
+            start[name] = floating.solution.values[name]
         bounds = pose_bounds(model)
         parameters = self._parameters(fingers) | term_weights(self.problem, model, weights)
         lower, upper = ({"activity": flags, "pose": bound} for bound in bounds)
@@ -205,9 +205,10 @@ class WholeHandStage:
             orientation = np.array([turned(q, v) for q, v in zip(orientation, offset[:, 3:], strict=True)])
         active = floating.active[schedule.sample_keyframes]
         point = sampled_points(model, values["point"].reshape(-1, contacts, 3))
-        forces = {
-            name: values[name].reshape(-1, contacts, 3) * active[:, :, None] for name in _FORCES if name in values
-        }
+        forces = [
+            values[f"force{scenario.suffix}"].reshape(-1, contacts, 3) * active[:, :, None]
+            for scenario in model.scenarios
+        ]
         return WholeHand(
             fingers=moved,
             contacts=self.contacts,
@@ -217,8 +218,8 @@ class WholeHandStage:
             position=pose[:, :3],
             vector=pose[:, 3:],
             point=point,
-            force=forces["force"],
+            force=forces[0],
             active=active,
             solution=solution,
-            disturbed=forces.get("force_perturbed"),
+            disturbed=forces[1] if model.disturbance else None,
         )

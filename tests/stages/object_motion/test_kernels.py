@@ -62,7 +62,7 @@ class Witness:
         keyframes = np.searchsorted(self.schedule.keyframes, self.schedule.samples + 1e-9) - 1
         self.activity = values["activity"][keyframes]
         self.forces = {"": values["force"].reshape(samples, count, 3)}
-        if model.disturbed:
+        if model.disturbance is not None:
             self.forces["_perturbed"] = values["force_perturbed"].reshape(samples, count, 3)
         self.points = [
             spline_at(self.schedule.keyframes, values["point"], self.schedule.samples + k * self.schedule.step).reshape(
@@ -80,7 +80,7 @@ class Witness:
     def motion_terms(self) -> dict[str, float]:
         model, h = self.model, self.schedule.step
         before, now, after = self.points
-        patches = model.patches if model.ground is None else np.vstack([model.patches, model.ground.patch])
+        patches = model.patches
         return {
             "object_acceleration": ((self.motion.acceleration - self.carried()) ** 2).sum(),
             "object_angular_acceleration": (self.motion.inertial_torque**2).sum() / h**2,
@@ -147,16 +147,16 @@ class Witness:
                     seen = palm.inv().apply(point - model.palm_position[s])
                     total += float(g(0.02 + capsule[6] - palm_apart(seen, model.palm_radius)))
                     if model.ground is not None:
-                        total += float(g(model.ground.height + capsule[6] - point[2]))
+                        total += float(g(model.ground + capsule[6] - point[2]))
         return total
 
     def force_terms(self, suffix: str) -> dict[str, float]:
         model, forces = self.model, self.forces[suffix]
         total = dict.fromkeys(FORCE_TERMS if model.ground is not None else FORCE_TERMS - GROUND_TERMS, 0.0)
         orientations = self.motion.at(0)[1]
-        zeros = np.zeros_like(model.disturbance_force)
-        push = model.disturbance_force if suffix else zeros
-        twist = model.disturbance_torque if suffix else zeros
+        zeros = np.zeros_like(model.disturbance.force)
+        push = model.disturbance.force if suffix else zeros
+        twist = model.disturbance.torque if suffix else zeros
         acceleration, torque_of_motion = self.motion.acceleration, self.motion.inertial_torque
         for s, turn in enumerate(orientations):
             c, force, point = self.activity[s], forces[s], self.points[1][s]
@@ -193,10 +193,10 @@ class Witness:
         projection, normal = project(point, model.ground.capsule)
         in_world = position + turn.apply(point)
         moved = in_world - position_before - turn_before.apply(point)
-        total["ground_friction_cone"] += c * cone(turn.apply(force), np.array([0, 0, 1]), model.ground.friction)
+        total["ground_friction_cone"] += c * cone(turn.apply(force), np.array([0, 0, 1]), model.frictions[-1])
         total["contact_on_object"] += size * c * ((projection - point) ** 2).sum()
         tilt = turn.apply(normal) + np.array([0, 0, 1])
-        total["contact_on_ground"] += size * c * ((in_world[2] - model.ground.height) ** 2 + 0.1 * tilt @ tilt)
+        total["contact_on_ground"] += size * c * ((in_world[2] - model.ground) ** 2 + 0.1 * tilt @ tilt)
         total["slip_on_ground"] += (c * size) ** 2 * ((moved / h) ** 2).sum()
 
 
@@ -347,7 +347,7 @@ def test_every_contact_force_is_held_in_its_cone(full: Case, suffix: str) -> Non
         for s, turn in enumerate(orientations):
             force, friction = witness.forces[suffix][s, c], model.friction
             if name == "ground":
-                inward, friction = turn.inv().apply([0, 0, 1]), model.ground.friction
+                inward, friction = turn.inv().apply([0, 0, 1]), model.frictions[-1]
             else:
                 inward = -project(witness.points[1][s, c], model.capsules[c])[1]
             across = np.linalg.norm(np.cross(force, inward))
