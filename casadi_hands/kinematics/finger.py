@@ -67,7 +67,8 @@ def _serialised(joints: int) -> str:
     if loaded != built_with:
         raise KinematicsError(
             f"the kinematics extension was built against casadi {built_with} but casadi {loaded} is loaded: "
-            f"reinstall casadi with pip install casadi=={built_with}"
+            f"go back with pip install casadi=={built_with}, or build the extension for the newest casadi with "
+            "pip install . in the source folder of casadi-hands"
         )
     try:
         extension = import_module("casadi_hands.kinematics._extension")

@@ -153,7 +153,8 @@ def test_another_casadi_is_refused_before_the_extension_runs(monkeypatch: pytest
     monkeypatch.setitem(sys.modules, "casadi_hands.kinematics._extension", Untouchable())
     message = (
         f"the kinematics extension was built against casadi {built_with} but casadi 3.6.7 is loaded: "
-        f"reinstall casadi with pip install casadi=={built_with}"
+        f"go back with pip install casadi=={built_with}, or build the extension for the newest casadi with "
+        "pip install . in the source folder of casadi-hands"
     )
     with pytest.raises(KinematicsError, match=f"^{re.escape(message)}$"):
         finger_kinematics.__wrapped__(2)
