@@ -57,6 +57,26 @@ def vector(array: np.ndarray) -> Vector:
     return x, y, z
 
 
+def follows(default: Callable[[dict[str, Any]], Any]) -> Callable[[dict[str, Any]], Any]:
+    """Let a field's default follow from the fields before it.
+
+    Args:
+        default: computes it from their values by name.
+
+    Returns:
+        The field's ``default_factory``.
+    """
+
+    def factory(values: dict[str, Any]) -> Any:
+        # Before 2.14, pydantic asks although one of them was refused. The section then is, too, and nobody sees this.
+        try:
+            return default(values)
+        except KeyError:
+            return None
+
+    return factory
+
+
 def fill(value: Any, **defaults: Any) -> Any:
     """Add defaults to a section that is still plain data; anything else is left for pydantic to judge."""
     return {**defaults, **value} if isinstance(value, dict) else value

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field, field_validator
 
-from casadi_hands.task.fields import Matrix, Positive, Section, Vector, refuse, vector
+from casadi_hands.task.fields import Matrix, Positive, Section, Vector, follows, refuse, vector
 from casadi_hands.task.shapes import SECTIONS, Primitive, Shape
 
 _KINDS = " and ".join(f"`{name}: {{{', '.join(each.model_fields)}}}`" for name, each in SECTIONS.items())
@@ -46,13 +46,13 @@ class ManipulatedObject(Section):
         description=f"The primitives whose union is the object: a list of {_KINDS}.",
     )
     center_of_mass: Vector = Field(
-        default_factory=_uniform_center,
+        default_factory=follows(_uniform_center),
         description="Centre of mass, m, object frame. After loading it is the frame's origin: everything given in "
         "the object frame, and the goals, are shifted to it.",
         json_schema_extra={"default": "that of the primitives, each solid and of one density; overlaps count twice"},
     )
     inertia: Matrix = Field(
-        default_factory=_uniform_inertia,
+        default_factory=follows(_uniform_inertia),
         description="Inertia about the centre of mass, 3 rows of 3, kg·m², axes of the object frame.",
         json_schema_extra={"default": "that of the primitives about their own centre; overlaps count twice"},
     )

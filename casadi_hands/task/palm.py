@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from casadi_hands.task.fields import Flag, Positive, Section, Vector, refuse
+from casadi_hands.task.fields import Flag, Positive, Section, Vector, follows, refuse
 from casadi_hands.task.rotation import rotation_matrix
 
 # cos 10°: closer to vertical than this, the vertical no longer says how the palm is rolled.
@@ -49,7 +49,7 @@ class Palm(Section):
         description="Radius of the disc, m.", json_schema_extra={"default": "1.2 × object's half extent"}
     )
     thickness: Positive = Field(
-        default_factory=lambda data: 0.2 * data["radius"],
+        default_factory=follows(lambda data: 0.2 * data["radius"]),
         description="Thickness of the disc, m; it lies behind the face with the fingers.",
         json_schema_extra={"default": "0.2 × palm.radius"},
     )

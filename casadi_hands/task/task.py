@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
 
 from casadi_hands.motion import nearest_exponential
-from casadi_hands.task.fields import Positive, Section, Vector, Whole, fill, refuse
+from casadi_hands.task.fields import Positive, Section, Vector, Whole, fill, follows, refuse
 from casadi_hands.task.hand import Actuator, FingerSpec, Ground, HandSpec
 from casadi_hands.task.limits import Limits, usual_replay_position
 from casadi_hands.task.motion import Goal, Perturbation
@@ -36,7 +36,7 @@ class Task(Section):
         default=None, description="The point of the object that draws, m, object frame; drawing tasks only."
     )
     duration: Positive = Field(
-        default_factory=lambda data: max(goal.at for goal in data["motion"]),
+        default_factory=follows(lambda data: max(goal.at for goal in data["motion"])),
         description="How long the motion takes, s.",
         json_schema_extra={"default": "the last goal's time"},
     )

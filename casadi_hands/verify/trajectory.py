@@ -60,7 +60,7 @@ def build_trajectory(folder: Folder, shots: Shots) -> Trajectory:
     base_rotation, base_position = _base(folder, interval, fraction)
     placed = place_links(folder, joints, base_rotation, base_position)
     placed["object"] = _object(folder, shots, interval, fraction)
-    placed["ground"] = np.broadcast_to(np.eye(3), (len(time), 3, 3)), np.zeros((len(time), 3))
+    placed["ground"] = np.tile(np.eye(3), (len(time), 1, 1)), np.zeros((len(time), 3))
     return Trajectory(time, interval, joints, speeds, placed)
 
 
@@ -75,7 +75,7 @@ def sample_placements(folder: Folder) -> dict[str, tuple[np.ndarray, np.ndarray]
     base = Rotation.from_quat(motion.base_orientation, scalar_first=True).as_matrix()
     placed = place_links(folder, motion.joint_angles, base, motion.base_position)
     placed["object"] = object_rotation(folder).as_matrix(), motion.object_position
-    placed["ground"] = np.broadcast_to(np.eye(3), base.shape), np.zeros_like(motion.base_position)
+    placed["ground"] = np.tile(np.eye(3), (len(base), 1, 1)), np.zeros_like(motion.base_position)
     return placed
 
 

@@ -125,27 +125,30 @@ def _miss(
     # The seven shots of all intervals at once: many small arrays take longer than a large one.
     rates = rate + step * np.vstack([np.zeros((1, 3)), np.eye(3), -np.eye(3)])[:, None]
     arrived = _integrate(folder, loads, start, rates)[3]
-    miss = (end.inv() * arrived).as_rotvec()
+    # SciPy before 1.17 has rotations in a row only.
+    row = Rotation.from_quat(arrived.reshape(-1, 4), scalar_first=True)
+    miss = (Rotation.concatenate([end.inv()] * len(rates)) * row).as_rotvec().reshape(rates.shape)
     return miss[0], np.moveaxis((miss[1:4] - miss[4:]) / (2 * step), 0, -1)
 
 
 def _integrate(
     folder: Folder, loads: Loads, start: Rotation, rate: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, Rotation]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Integrate all intervals at once from rest at the origin with launch rates (..., K, 3).
 
     Returns:
-        distance travelled and velocity gained in the world, arrival rate, each as ``rate``, and arrival orientation.
+        distance travelled and velocity gained in the world, arrival rate, each as ``rate``, and arrival orientation
+        (..., K, 4), [w, x, y, z].
     """
     mass, inertia = folder.object.mass, folder.object.inertia
     inverse, fastest = np.linalg.inv(inertia), FASTEST / loads.time[:, None]
 
     def slope(fraction: float, state: np.ndarray) -> np.ndarray:
         velocity, quaternion, omega = state[..., 3:6], state[..., 6:10], np.clip(state[..., 10:13], -fastest, fastest)
-        turn = Rotation.from_quat(quaternion, scalar_first=True)
+        turn = _matrices(quaternion)
         force, moment, external_force, external_torque = loads.at(fraction)
-        acceleration = folder.gravity + (turn.apply(force) + external_force) / mass
-        torque = moment + turn.apply(external_torque, inverse=True) - np.cross(omega, omega @ inertia)
+        acceleration = folder.gravity + ((turn @ force[..., None])[..., 0] + external_force) / mass
+        torque = moment + (external_torque[..., None, :] @ turn)[..., 0, :] - np.cross(omega, omega @ inertia)
         return np.concatenate([velocity, acceleration, _quaternion_rate(quaternion, omega), torque @ inverse], axis=-1)
 
     quaternion = np.broadcast_to(start.as_quat(scalar_first=True), (*rate.shape[:-1], 4))
@@ -158,7 +161,14 @@ def _integrate(
         k3 = slope(at + share / 2, state + step / 2 * k2)
         k4 = slope(at + share, state + step * k3)
         state = state + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-    return state[..., :3], state[..., 3:6], state[..., 10:13], Rotation.from_quat(state[..., 6:10], scalar_first=True)
+    return state[..., :3], state[..., 3:6], state[..., 10:13], state[..., 6:10]
+
+
+def _matrices(quaternion: np.ndarray) -> np.ndarray:
+    """Return the rotation matrices (..., 3, 3) of quaternions (..., 4), which are normalised first."""
+    row = Rotation.from_quat(quaternion.reshape(-1, 4), scalar_first=True).as_matrix()
+    matrices: np.ndarray = row.reshape(*quaternion.shape[:-1], 3, 3)
+    return matrices
 
 
 def _quaternion_rate(quaternion: np.ndarray, omega: np.ndarray) -> np.ndarray:
