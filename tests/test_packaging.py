@@ -1,0 +1,58 @@
+"""What pyproject.toml, the build, the lock file and the citation say of versions is one thing."""
+
+from __future__ import annotations
+
+import tomllib
+from importlib import import_module
+from importlib.metadata import requires, version
+from pathlib import Path
+
+import yaml
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+import casadi_hands
+
+ROOT = Path(__file__).parents[1]
+PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+BUILD = [Requirement(each) for each in PYPROJECT["build-system"]["requires"]]
+CORE = [Requirement(each) for each in PYPROJECT["project"]["dependencies"]]
+TESTS = [Requirement(each) for each in PYPROJECT["project"]["optional-dependencies"]["test"]]
+
+
+def locked() -> dict[str, str]:
+    """The versions that .ci/run installs, by name."""
+    lines = (ROOT / ".ci/requirements.lock").read_text(encoding="utf-8").splitlines()
+    pins = [Requirement(line) for line in lines if not line.startswith("#")]
+    assert all(len(pin.specifier) == 1 and str(pin.specifier).startswith("==") and not pin.url for pin in pins)
+    return {canonicalize_name(pin.name): str(pin.specifier)[2:] for pin in pins}
+
+
+def of_casadi(requirements: list[Requirement]) -> list[str]:
+    return [str(each.specifier) for each in requirements if each.name == "casadi"]
+
+
+def test_the_build_takes_the_casadi_that_the_package_allows() -> None:
+    assert of_casadi(BUILD) == of_casadi(CORE)
+    assert len(of_casadi(CORE)) == 1
+
+
+def test_the_installed_package_requires_the_casadi_it_was_built_against() -> None:
+    # So that pip tells of a change of casadi, or builds the extension again.
+    built_with = import_module("casadi_hands.kinematics._built_with").CASADI_VERSION
+    installed = [Requirement(each) for each in requires("casadi-hands") or []]
+    assert f"=={built_with}" in of_casadi(installed)
+    assert version("casadi") == built_with
+
+
+def test_the_lock_has_a_version_that_fits_for_all_that_is_asked_for() -> None:
+    versions = locked()
+    unmet = [str(each) for each in BUILD + CORE + TESTS if versions[canonicalize_name(each.name)] not in each.specifier]
+    assert unmet == []
+
+
+def test_the_citation_is_of_this_version() -> None:
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert citation["version"] == casadi_hands.__version__
+    assert citation["license"] == PYPROJECT["project"]["license"]
+    assert citation["references"][0]["number"] == "CMU-RI-TR-18-36"
