@@ -7,8 +7,6 @@ import pytest
 
 from casadi_hands.geometry import closest_on_segment, nearest_on_axis, project_to_capsule
 
-RANDOM = np.random.default_rng(3)
-
 
 def project(point, start, end, radius) -> tuple[np.ndarray, np.ndarray, float]:
     projection, normal, distance = project_to_capsule(*(ca.DM(v) for v in (point, start, end, radius)))
@@ -28,9 +26,9 @@ def distance_by_coal(point: np.ndarray, start: np.ndarray, end: np.ndarray, radi
 
 
 @pytest.mark.parametrize("case", range(20))
-def test_projection_outside_agrees_with_coal(case: int) -> None:
-    start, end = RANDOM.normal(size=(2, 3))
-    point = 3 * RANDOM.normal(size=3)
+def test_projection_outside_agrees_with_coal(case: int, rng: np.random.Generator) -> None:
+    start, end = rng.normal(size=(2, 3))
+    point = 3 * rng.normal(size=3)
     projection, normal, distance = project(point, start, end, 0.3)
     if distance > 0.05:
         assert distance == pytest.approx(distance_by_coal(point, start, end, 0.3), abs=3e-5)

@@ -15,8 +15,6 @@ from casadi_hands.motion import (
     rotation_matrix,
 )
 
-RANDOM = np.random.default_rng(2)
-
 
 def wxyz(rotation: Rotation) -> np.ndarray:
     return rotation.as_quat(scalar_first=True)
@@ -27,9 +25,9 @@ def numbers(value: ca.DM) -> np.ndarray:
 
 
 @pytest.mark.parametrize("degrees", [0, 1e-6, 1, 90, 179.9999, 180, 181, 250, 300])
-def test_exponential_agrees_with_scipy(degrees: float) -> None:
+def test_exponential_agrees_with_scipy(degrees: float, rng: np.random.Generator) -> None:
     for _ in range(5):
-        axis = RANDOM.normal(size=3)
+        axis = rng.normal(size=3)
         vector = np.radians(degrees) * axis / np.linalg.norm(axis)
         quaternion = numbers(exponential(ca.DM(vector)))
         assert np.linalg.norm(quaternion) == pytest.approx(1, abs=1e-11)
@@ -50,16 +48,16 @@ def test_exponential_has_exact_derivatives_at_zero() -> None:
     np.testing.assert_allclose(at_zero[1], -np.eye(3) / 4, atol=1e-15)  # cos(|x| / 2)
 
 
-def test_products_inverses_and_matrices_agree_with_scipy() -> None:
-    a, b = Rotation.random(rng=RANDOM), Rotation.random(rng=RANDOM)
+def test_products_inverses_and_matrices_agree_with_scipy(rng: np.random.Generator) -> None:
+    a, b = Rotation.random(rng=rng), Rotation.random(rng=rng)
     qa, qb = ca.DM(wxyz(a)), ca.DM(wxyz(b))
     np.testing.assert_allclose(numbers(rotation_matrix(multiply(qa, qb))), (a * b).as_matrix(), atol=1e-14)
     np.testing.assert_allclose(numbers(rotation_matrix(conjugate(qa))), a.inv().as_matrix(), atol=1e-14)
 
 
 @pytest.mark.parametrize("degrees", [0, 0.5, 3, 60, 180])
-def test_angle_is_the_chord_of_the_half_angle(degrees: float) -> None:
-    a = Rotation.random(rng=RANDOM)
+def test_angle_is_the_chord_of_the_half_angle(degrees: float, rng: np.random.Generator) -> None:
+    a = Rotation.random(rng=rng)
     b = a * Rotation.from_rotvec([0, 0, degrees], degrees=True)
     found = float(angle_squared(ca.DM(wxyz(a)), ca.DM(wxyz(b))))
     assert found == pytest.approx(4 * np.sin(np.radians(degrees) / 2) ** 2, abs=1e-13)
@@ -67,9 +65,9 @@ def test_angle_is_the_chord_of_the_half_angle(degrees: float) -> None:
         assert found == pytest.approx(np.radians(degrees) ** 2, rel=1e-3)
 
 
-def test_angular_motion_of_a_spinning_body_in_closed_form() -> None:
+def test_angular_motion_of_a_spinning_body_in_closed_form(rng: np.random.Generator) -> None:
     # Turned about a fixed axis n by phi(t): velocity n phi', acceleration n phi'', the same in world and body.
-    axis, start = np.array([2, -1, 2]) / 3, Rotation.random(rng=RANDOM)
+    axis, start = np.array([2, -1, 2]) / 3, Rotation.random(rng=rng)
     phi = np.polynomial.Polynomial([0.3, 1.1, -0.7, 0.4])
     t, h = 0.6, 1e-3
     quaternions = [ca.DM(wxyz(Rotation.from_rotvec(axis * phi(t + k * h)) * start)) for k in (-1, 0, 1)]

@@ -9,8 +9,6 @@ from casadi import DM, MX, Function
 
 from casadi_hands.nlp import Constraint, Kernel, Parameter, Problem, Rows, Term
 
-RANDOM = np.random.default_rng(4)
-
 
 def spring() -> Kernel:
     """Two terms and a constraint in two local variables; one parameter for each instance, one for all."""
@@ -53,12 +51,13 @@ class Example:
     """The same program twice: assembled, and written out instance by instance for CasADi to differentiate."""
 
     def __init__(self) -> None:
+        rng = np.random.default_rng(4)
         self.problem = problem = Problem()
         first = problem.variable("first", (4, 2), quantity="a")
         second = problem.variable("second", (3, 3), -1, 1, quantity="b")
         own = problem.parameter("own", (5, 2))
         shared = problem.parameter("shared", (1, 1))
-        self.mixing = [RANDOM.normal(size=(5, 4)), RANDOM.normal(size=(5, 3))]
+        self.mixing = [rng.normal(size=(5, 4)), rng.normal(size=(5, 3))]
         self.bindings: list[tuple[Kernel, list[np.ndarray], list[np.ndarray]]] = []
         mixed = first.combine(self.mixing[0])
         # By name, so in any order.
@@ -106,9 +105,9 @@ def example() -> Example:
     return Example()
 
 
-@pytest.fixture(scope="module")
-def at(example: Example) -> tuple[np.ndarray, np.ndarray]:
-    return RANDOM.normal(size=example.problem.variables.size), RANDOM.uniform(0.5, 2, example.problem.parameters.size)
+@pytest.fixture
+def at(example: Example, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    return rng.normal(size=example.problem.variables.size), rng.uniform(0.5, 2, example.problem.parameters.size)
 
 
 def test_value_gradient_and_jacobian(example: Example, at) -> None:
@@ -125,11 +124,11 @@ def test_value_gradient_and_jacobian(example: Example, at) -> None:
         np.testing.assert_allclose(np.asarray(found), np.asarray(expected), rtol=1e-12, atol=1e-12)
 
 
-def test_hessian_of_the_lagrangian_is_the_upper_triangle(example: Example, at) -> None:
+def test_hessian_of_the_lagrangian_is_the_upper_triangle(example: Example, at, rng: np.random.Generator) -> None:
     x, p, f, g = example.written_out()
     scale, multipliers = MX.sym("s"), MX.sym("l", g.numel())
     hessian = ca.hessian(scale * f + ca.dot(multipliers, g), x)[0]
-    arguments = (*at, 0.7, RANDOM.normal(size=g.numel()))
+    arguments = (*at, 0.7, rng.normal(size=g.numel()))
     truth = np.asarray(Function("t", [x, p, scale, multipliers], [hessian])(*arguments))
     found = example.problem.functions()["hess_lag"](*arguments)
     np.testing.assert_allclose(np.asarray(found), np.triu(truth), rtol=1e-11, atol=1e-11)

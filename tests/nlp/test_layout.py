@@ -6,8 +6,6 @@ import pytest
 from casadi_hands.nlp import Layout, Parameter, Problem, Rows
 from casadi_hands.nlp.layout import Label
 
-RANDOM = np.random.default_rng(0)
-
 
 def example() -> Layout:
     layout = Layout()
@@ -17,9 +15,9 @@ def example() -> Layout:
     return layout
 
 
-def test_unpack_undoes_pack() -> None:
+def test_unpack_undoes_pack(rng: np.random.Generator) -> None:
     layout = example()
-    values = {name: RANDOM.normal(size=layout[name].shape) for name in layout.names()}
+    values = {name: rng.normal(size=layout[name].shape) for name in layout.names()}
     vector = layout.pack(values, np.zeros(layout.size))
     assert layout.size == 4 * 6 + 1 + 6
     assert sorted(vector) == sorted(np.concatenate([v.ravel() for v in values.values()]))
@@ -45,9 +43,9 @@ def test_unknown_and_repeated_names_are_refused() -> None:
     assert "pse" not in layout
 
 
-def test_rows_read_combine_take_and_split() -> None:
-    indices = RANDOM.permutation(12).reshape(4, 3)
-    x, weights = RANDOM.normal(size=12), RANDOM.normal(size=(5, 4))
+def test_rows_read_combine_take_and_split(rng: np.random.Generator) -> None:
+    indices = rng.permutation(12).reshape(4, 3)
+    x, weights = rng.normal(size=12), rng.normal(size=(5, 4))
     rows = Rows.of(indices, 12)
     plain = x[indices]
 
@@ -64,9 +62,9 @@ def test_rows_read_combine_take_and_split() -> None:
     )
 
 
-def test_rows_beside_each_other_have_the_entries_of_all() -> None:
-    x = RANDOM.normal(size=20)
-    first, second = RANDOM.permutation(20)[:12].reshape(4, 3), RANDOM.permutation(20)[:8].reshape(4, 2)
+def test_rows_beside_each_other_have_the_entries_of_all(rng: np.random.Generator) -> None:
+    x = rng.normal(size=20)
+    first, second = rng.permutation(20)[:12].reshape(4, 3), rng.permutation(20)[:8].reshape(4, 2)
     rows = Rows.beside([Rows.of(first, 20), Rows.of(second, 20), Rows.of(first, 20).entries(1, 2)])
     assert (rows.count, rows.width) == (4, 6)
     np.testing.assert_array_equal((rows.matrix @ x).reshape(4, 6), np.hstack([x[first], x[second], x[first][:, 1:2]]))
@@ -119,8 +117,8 @@ def test_rows_keep_what_they_are_and_tell_when() -> None:
     assert Rows.of(np.arange(3)[None], 12).label == Label()
 
 
-def test_parameters_read_take_and_split() -> None:
-    positions, label = RANDOM.permutation(12).reshape(4, 3), Label("target", owner=1)
+def test_parameters_read_take_and_split(rng: np.random.Generator) -> None:
+    positions, label = rng.permutation(12).reshape(4, 3), Label("target", owner=1)
     target = Parameter(positions, label)
     assert target.shape == (4, 3)
     for taken, expected, mark in (

@@ -14,7 +14,6 @@ from casadi_hands.statics.grasp import friction_edges, grasp_map
 from casadi_hands.task import parse_task
 from tests.stages.example import Motion, everything, made_up_values, project
 
-RANDOM = np.random.default_rng(0)
 BALL = """
 object: {{mass: 0.1, shapes: [{{sphere: {{center: [0, 0, 0], radius: 0.03}}}}]}}
 palm: {{radius: 0.06, position: [0, 0, 0.2], facing: [0, 0, -1]}}
@@ -54,21 +53,21 @@ def falling(model: Model, gravities: float) -> np.ndarray:
     return pose
 
 
-def test_grasp_map_sums_forces_and_torques() -> None:
-    points, forces = RANDOM.normal(size=(2, 4, 3))
+def test_grasp_map_sums_forces_and_torques(rng: np.random.Generator) -> None:
+    points, forces = rng.normal(size=(2, 4, 3))
     wrench = grasp_map(points) @ forces.ravel()
     np.testing.assert_allclose(wrench, np.r_[forces.sum(axis=0), np.cross(points, forces).sum(axis=0)], atol=1e-12)
 
 
-def test_normals_point_into_the_object() -> None:
+def test_normals_point_into_the_object(rng: np.random.Generator) -> None:
     _, model = everything()
-    points = model.patches + 0.05 * RANDOM.normal(size=model.patches.shape)
+    points = model.patches + 0.05 * rng.normal(size=model.patches.shape)
     expected = [-project(p, c)[1] for p, c in zip(points, model.capsules, strict=True)]
     np.testing.assert_allclose(inward_normals(points, model.capsules), expected, atol=1e-12)
 
 
-def test_edges_are_on_the_cone() -> None:
-    normals = Rotation.random(2, rng=RANDOM).apply([0, 0, 1])
+def test_edges_are_on_the_cone(rng: np.random.Generator) -> None:
+    normals = Rotation.random(2, rng=rng).apply([0, 0, 1])
     edges = friction_edges(normals, np.array([0.5, 0.8]))
     for normal, mu, span in zip(normals, (0.5, 0.8), np.split(edges, 2, axis=1), strict=True):
         pressing = normal @ span
@@ -78,9 +77,9 @@ def test_edges_are_on_the_cone() -> None:
         np.testing.assert_allclose(span.mean(axis=1), normal, atol=1e-12)
 
 
-def test_least_squares_forces_hold_the_weight() -> None:
+def test_least_squares_forces_hold_the_weight(rng: np.random.Generator) -> None:
     _, model = everything()
-    turn = Rotation.random(rng=RANDOM)
+    turn = Rotation.random(rng=rng)
     forces = least_squares_forces(model, turn.as_matrix())
     assert model.ground is not None
     points = model.patches
@@ -116,11 +115,11 @@ def test_needed_torque_about_one_axis_is_inertia_times_angular_acceleration() ->
     assert np.abs(expected).max() > 1e-3
 
 
-def test_gate_accepts_force_closure() -> None:
+def test_gate_accepts_force_closure(rng: np.random.Generator) -> None:
     model = ball(0)
     assert passes_gate(model, plan(model))
     # Three contacts around the equator can make any wrench, so any motion will do, and any gravity.
-    random = 0.5 * RANDOM.normal(size=(len(model.schedule.keyframes), 6))
+    random = 0.5 * rng.normal(size=(len(model.schedule.keyframes), 6))
     assert passes_gate(model, plan(model, pose=random))
     upward = ball(0, gravity=9.81)
     assert passes_gate(upward, plan(upward))

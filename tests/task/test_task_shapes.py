@@ -7,8 +7,6 @@ from scipy.integrate import dblquad
 
 from casadi_hands.task import Capsule, Sphere
 
-RNG = np.random.default_rng(4)
-
 
 def revolved(capsule: Capsule) -> tuple[float, float, float]:
     """Volume, and unit inertia along and across the axis, by integrating over the profile."""
@@ -49,12 +47,12 @@ def test_solid_of_a_sphere() -> None:
     assert same.unit_inertia == pytest.approx(sphere.unit_inertia)
 
 
-def test_signed_distance_agrees_with_coal() -> None:
+def test_signed_distance_agrees_with_coal(rng: np.random.Generator) -> None:
     start, end, radius = np.array([0, 0, -0.03]), np.array([0, 0, 0.05]), 0.02
     capsule = Capsule(start=tuple(start), end=tuple(end), radius=radius)
     body = coal.Capsule(radius, 0.08)
     placed = coal.Transform3s(np.eye(3), (start + end) / 2)
-    for point in RNG.uniform(-0.1, 0.1, (50, 3)):
+    for point in rng.uniform(-0.1, 0.1, (50, 3)):
         # Coal has no points; a small ball's distance is the point's less its radius.
         result = coal.DistanceResult()
         place = coal.Transform3s(np.eye(3), point)

@@ -6,7 +6,6 @@ import pytest
 
 from casadi_hands.terms import contact
 
-RANDOM = np.random.default_rng(6)
 ROUNDED = 1e-3  # what ‖f‖ is at f = 0
 
 
@@ -37,14 +36,14 @@ def test_friction_cone_has_finite_derivatives_without_force() -> None:
         assert np.isfinite(np.asarray(found)).all()
 
 
-def test_off_surface() -> None:
-    force, point, projection = RANDOM.normal(size=(3, 3))
+def test_off_surface(rng: np.random.Generator) -> None:
+    force, point, projection = rng.normal(size=(3, 3))
     value = float(contact.off_surface(*dm(force, 0.4, point, projection)))
     assert value == pytest.approx(np.linalg.norm(force) * 0.4 * np.sum((projection - point) ** 2), rel=1e-5)
 
 
-def test_gap_rate_sees_the_gap_and_slip_the_sliding() -> None:
-    force, gap, gap_before, point, before = RANDOM.normal(size=(5, 3))
+def test_gap_rate_sees_the_gap_and_slip_the_sliding(rng: np.random.Generator) -> None:
+    force, gap, gap_before, point, before = rng.normal(size=(5, 3))
     size = 0.4 * np.linalg.norm(force)
     found = np.asarray(contact.gap_rate(*dm(force, 0.4, gap, gap_before, 0.1))).ravel()
     np.testing.assert_allclose(found, size * (gap - gap_before) / 0.1, rtol=1e-5)

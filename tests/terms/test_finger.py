@@ -6,8 +6,6 @@ import pytest
 
 from casadi_hands.terms import finger
 
-RANDOM = np.random.default_rng(9)
-
 
 def evaluated(expression) -> np.ndarray:
     return np.asarray(ca.evalf(expression)).squeeze()
@@ -18,8 +16,8 @@ def sx(*arrays) -> list[ca.SX]:
 
 
 @pytest.mark.parametrize("joints", [1, 2, 3, 4])
-def test_null_space_is_the_svd_projection_in_the_limit_of_no_damping(joints: int) -> None:
-    jacobian, force = RANDOM.normal(size=(3, joints)), RANDOM.normal(size=3)
+def test_null_space_is_the_svd_projection_in_the_limit_of_no_damping(joints: int, rng: np.random.Generator) -> None:
+    jacobian, force = rng.normal(size=(3, joints)), rng.normal(size=3)
     left, singular, _ = np.linalg.svd(jacobian)
     free = left[:, int((singular > 1e-9).sum()) :]
     expected = free @ free.T @ force
@@ -39,13 +37,13 @@ def test_damping_counts_a_force_without_a_lever_as_unsupplied() -> None:
 
 
 @pytest.mark.parametrize("joints", [1, 2, 3])
-def test_torques_are_those_of_eq_a5_with_its_matrix_written_out(joints: int) -> None:
+def test_torques_are_those_of_eq_a5_with_its_matrix_written_out(joints: int, rng: np.random.Generator) -> None:
     # A.5: f = X α + rest with the columns of X the joints' directions over their levers, J_i / ‖J_i‖²; the damped
     # least-squares α is (XᵀX + λ²)⁻¹ Xᵀ f.
-    jacobian, force = RANDOM.normal(size=(3, joints)), RANDOM.normal(size=3)
+    jacobian, force = rng.normal(size=(3, joints)), rng.normal(size=3)
     x = jacobian / (jacobian**2).sum(axis=0)
     expected = np.linalg.solve(x.T @ x + 1e-6 * np.eye(joints), x.T @ force)
-    np.testing.assert_allclose(evaluated(finger.joint_torques(*sx(jacobian, force))), expected, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(evaluated(finger.joint_torques(*sx(jacobian, force))), expected, rtol=1e-5, atol=1e-5)
 
 
 def test_torques_of_orthogonal_joints_are_force_times_lever() -> None:
@@ -66,9 +64,9 @@ def test_terms_of_a_joint_without_lever_are_finite() -> None:
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 5])
-def test_positive_system(size: int) -> None:
-    a = RANDOM.normal(size=(size, size))
-    matrix, right = a @ a.T + 0.1 * np.eye(size), RANDOM.normal(size=size)
+def test_positive_system(size: int, rng: np.random.Generator) -> None:
+    a = rng.normal(size=(size, size))
+    matrix, right = a @ a.T + 0.1 * np.eye(size), rng.normal(size=size)
     np.testing.assert_allclose(
         np.atleast_1d(evaluated(finger.solve_positive(*sx(matrix, right)))), np.linalg.solve(matrix, right), rtol=1e-8
     )
