@@ -1,26 +1,117 @@
-"""Bodies as the URDF states them: mass properties and solid shapes, with distances by closed form and by coal."""
+"""Solid shapes as files state them, measured in closed form, by coal and for Drake.
+
+To add a shape, add a class and, where an object may be made of it, how task files state it to `FORMS`. What a shape
+does not say raises ``NotImplementedError``.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Self
 
 import coal
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+_QUARTER = 1.01 * np.pi / 2
+"""Of a sphere's radius: its mesh's edges before they are halved, and a little more, so that they are."""
 
-@dataclass(frozen=True)
-class Capsule:
-    """All points within ``radius`` of the segment ``start``-``end``; a sphere is a capsule of no length.
+
+class Shape(ABC):
+    """A solid in its body's frame, m.
 
     Attributes:
-        start, end: (3,) m, in the body's frame.
-        radius: m.
+        radius: with which its surface bends most, edges aside; infinite where all is flat.
     """
+
+    radius: float
+
+    def distance(self, point: np.ndarray) -> np.ndarray:
+        """Return the (...,) signed distances of (..., 3) points to the surface, m; negative inside."""
+        raise NotImplementedError(f"the distance of a point from a {type(self).__name__.lower()}")
+
+    def normal(self, point: np.ndarray) -> np.ndarray:
+        """Return the (..., 3) unit outward normals at the surface points nearest to (..., 3) points."""
+        raise NotImplementedError(f"the normal of a {type(self).__name__.lower()}")
+
+    def agrees(self, other: Shape) -> bool:
+        """Whether another is the same solid, to a millionth of its size."""
+        raise NotImplementedError(f"what a {type(self).__name__.lower()} is the same as")
+
+    @property
+    def box(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper corner (3,) of the bounding box, m."""
+        raise NotImplementedError(f"the bounding box of a {type(self).__name__.lower()}")
+
+    @property
+    def depth(self) -> float:
+        """How far its deepest point is below the surface, m."""
+        raise NotImplementedError(f"the depth of a {type(self).__name__.lower()}")
+
+    @property
+    @abstractmethod
+    def pose(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rotation (3, 3) and position (3,) of the frame in which coal and Drake know the shape, in the body's."""
+
+    @abstractmethod
+    def coal(self) -> coal.CollisionGeometry:
+        """Return coal's shape."""
+
+    def edge(self, off: float) -> float:
+        """Return how long edges of triangles may be that leave the surface by so much at most, m."""
+        raise NotImplementedError(f"the triangles of a {type(self).__name__.lower()}")
+
+    @abstractmethod
+    def drake(self, geometry: Any, edge: float = 0.0) -> Any:
+        """Return Drake's shape.
+
+        Args:
+            geometry: Drake's module.
+            edge: of its mesh's triangles, m. Drake's meshes have their corners on the surface, so they lie inside;
+                grown for such edges, they lie about it.
+        """
+
+
+@dataclass(frozen=True, eq=False)
+class _Round(Shape):
+    """A solid of revolution about an axis from ``start`` to ``end`` (3,), with a ``radius``, all m, body frame."""
 
     start: np.ndarray
     end: np.ndarray
     radius: float
+
+    @classmethod
+    def stated(cls, points: Sequence[np.ndarray], sizes: Sequence[float]) -> Self:
+        """Return the shape of points (3,) and lengths in the order of its form."""
+        return cls(points[0], points[-1], sizes[0])
+
+    @property
+    def length(self) -> float:
+        """Of the axis, m."""
+        return float(np.linalg.norm(self.end - self.start))
+
+    def agrees(self, other: Shape) -> bool:
+        """See `Shape`: the axis either way around."""
+        if not isinstance(other, _Round) or type(other) is not type(self):
+            return False
+        near = 1e-6 * max(self.radius, self.length)
+        straight = np.linalg.norm(self.start - other.start) + np.linalg.norm(self.end - other.end)
+        turned = np.linalg.norm(self.start - other.end) + np.linalg.norm(self.end - other.start)
+        return bool(min(straight, turned) < near and abs(self.radius - other.radius) < near)
+
+    @property
+    def pose(self) -> tuple[np.ndarray, np.ndarray]:
+        """See `Shape`: its z is the axis, its origin in the middle."""
+        length, middle = self.length, 0.5 * (self.start + self.end)
+        if length == 0.0:
+            return np.eye(3), middle
+        return Rotation.align_vectors([(self.end - self.start) / length], [[0.0, 0.0, 1.0]])[0].as_matrix(), middle
+
+
+class Capsule(_Round):
+    """All points within ``radius`` of the segment ``start``-``end``; a sphere is a capsule of no length."""
 
     def axis_point(self, point: np.ndarray) -> np.ndarray:
         """Return the (..., 3) points of the capsule's segment nearest to (..., 3) points, body frame."""
@@ -33,178 +124,128 @@ class Capsule:
         return nearest
 
     def distance(self, point: np.ndarray) -> np.ndarray:
-        """Return the (...,) signed distances of (..., 3) points to the surface, m; negative inside."""
+        """See `Shape`."""
         distance: np.ndarray = np.linalg.norm(point - self.axis_point(point), axis=-1) - self.radius
         return distance
 
     def normal(self, point: np.ndarray) -> np.ndarray:
-        """Return the (..., 3) unit outward normals at the surface points nearest to (..., 3) points."""
+        """See `Shape`; zero on the axis."""
         outward = point - self.axis_point(point)
         unit: np.ndarray = outward / np.maximum(np.linalg.norm(outward, axis=-1, keepdims=True), 1e-300)
         return unit
 
+    @property
+    def box(self) -> tuple[np.ndarray, np.ndarray]:
+        """See `Shape`."""
+        return np.minimum(self.start, self.end) - self.radius, np.maximum(self.start, self.end) + self.radius
 
-@dataclass(frozen=True)
-class Cylinder:
-    """A solid cylinder, placed in the body's frame.
+    def coal(self) -> coal.CollisionGeometry:
+        """See `Shape`."""
+        length = self.length
+        return coal.Capsule(self.radius, length) if length else coal.Sphere(self.radius)
 
-    Attributes:
-        placement: (4, 4) body <- cylinder; the cylinder's axis is z through its centre.
-        radius, length: m.
-    """
+    @property
+    def depth(self) -> float:
+        """See `Shape`."""
+        return self.radius
 
-    placement: np.ndarray
-    radius: float
-    length: float
+    def edge(self, off: float) -> float:
+        """See `Shape`; a sphere's triangles are halved a number of times."""
+        if self.length:
+            return _chord(self.radius, off)
+        halvings = max(round(np.log2(0.5 * self.radius / off) / 2), 2)
+        return float(_QUARTER * self.radius / 2**halvings)
+
+    def drake(self, geometry: Any, edge: float = 0.0) -> Any:
+        """See `Shape`."""
+        if self.length:
+            return geometry.Capsule(_grown(self.radius, edge), self.length)
+        return geometry.Sphere(self.radius * (1 + 0.5 * (edge / (_QUARTER * self.radius)) ** 2))
 
 
-@dataclass(frozen=True)
-class Body:
-    """One URDF link.
+class Cylinder(_Round):
+    """A solid cylinder with sharp edges; ``start`` and ``end`` are the centres of its flat faces."""
 
-    Attributes:
-        name: as in the URDF.
-        mass: kg.
-        center_of_mass: (3,) m, body frame.
-        inertia: (3, 3) kg·m², about the centre of mass, axes of the body frame.
-        capsules, cylinders: the collision geometry.
-    """
+    @property
+    def box(self) -> tuple[np.ndarray, np.ndarray]:
+        """See `Shape`."""
+        along = (self.end - self.start) / self.length
+        rim = self.radius * np.sqrt(np.maximum(1.0 - along**2, 0.0))
+        return np.minimum(self.start, self.end) - rim, np.maximum(self.start, self.end) + rim
 
-    name: str
-    mass: float
-    center_of_mass: np.ndarray
-    inertia: np.ndarray
-    capsules: tuple[Capsule, ...]
-    cylinders: tuple[Cylinder, ...]
-    solids: tuple[tuple[coal.CollisionGeometry, np.ndarray, np.ndarray], ...] = field(repr=False)
+    def coal(self) -> coal.CollisionGeometry:
+        """See `Shape`."""
+        return coal.Cylinder(self.radius, self.length)
 
-    def nearest(self, point: np.ndarray) -> Capsule:
-        """Return the capsule whose surface is nearest to the (3,) point, body frame."""
-        return min(self.capsules, key=lambda capsule: abs(float(capsule.distance(point))))
+    @property
+    def depth(self) -> float:
+        """See `Shape`."""
+        return min(self.radius, 0.5 * self.length)
 
-    def surface_distance(self, point: np.ndarray) -> float:
-        """Return the signed distance of the (3,) point to the union of the capsules, m."""
-        return min(float(capsule.distance(point)) for capsule in self.capsules)
+    def edge(self, off: float) -> float:
+        """See `Shape`."""
+        return _chord(self.radius, off)
+
+    def drake(self, geometry: Any, edge: float = 0.0) -> Any:
+        """See `Shape`."""
+        return geometry.Cylinder(_grown(self.radius, edge), self.length)
+
+
+@dataclass(frozen=True, eq=False)
+class HalfSpace(Shape):
+    """All that is below z = ``height``, m."""
+
+    height: float
+    radius = float("inf")
+
+    def distance(self, point: np.ndarray) -> np.ndarray:
+        """See `Shape`."""
+        return np.asarray(point[..., 2] - self.height)
 
     def normal(self, point: np.ndarray) -> np.ndarray:
-        """Return the (3,) unit outward normal of the surface nearest to the (3,) point, body frame."""
-        return self.nearest(point).normal(point)
+        """See `Shape`."""
+        return np.broadcast_to([0.0, 0.0, 1.0], np.shape(point))
 
-    def project(self, point: np.ndarray) -> np.ndarray:
-        """Return the (3,) point of the surface nearest to the (3,) point, body frame."""
-        capsule = self.nearest(point)
-        return point - float(capsule.distance(point)) * capsule.normal(point)
+    @property
+    def pose(self) -> tuple[np.ndarray, np.ndarray]:
+        """See `Shape`."""
+        return np.eye(3), np.array([0.0, 0.0, self.height])
 
+    def coal(self) -> coal.CollisionGeometry:
+        """See `Shape`."""
+        return coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
 
-def merge(spheres: list[Capsule], cylinders: list[Cylinder]) -> tuple[list[Capsule], list[Cylinder]]:
-    """Return capsules, joined of each cylinder and its two end spheres, and what does not form one."""
-    capsules: list[Capsule] = []
-    bare: list[Cylinder] = []
-    unused = spheres
-    for cylinder in cylinders:
-        center, half = cylinder.placement[:3, 3], 0.5 * cylinder.length * cylinder.placement[:3, 2]
-        # Capsules that share an end may have a sphere each there, or one for all.
-        caps = [
-            _sphere_at(unused, center + sign * half, cylinder.radius)
-            or _sphere_at(spheres, center + sign * half, cylinder.radius)
-            for sign in (-1, 1)
-        ]
-        if caps[0] is None or caps[1] is None:
-            bare.append(cylinder)
-            continue
-        unused = [sphere for sphere in unused if all(sphere is not cap for cap in caps)]
-        capsules.append(Capsule(caps[0].start, caps[1].start, cylinder.radius))
-    return capsules + unused, bare
+    def drake(self, geometry: Any, edge: float = 0.0) -> Any:
+        """See `Shape`."""
+        return geometry.HalfSpace()
 
 
-def _sphere_at(spheres: list[Capsule], center: np.ndarray, radius: float) -> Capsule | None:
-    near = 1e-6 * radius
-    for sphere in spheres:
-        if np.linalg.norm(sphere.start - center) < near and abs(sphere.radius - radius) < near:
-            return sphere
-    return None
+def _chord(radius: float, off: float) -> float:
+    """Return how long a chord of a circle may be whose middle is off it by so much; there are eight at least."""
+    return float(min(np.sqrt(8 * radius * off), np.pi / 4 * radius))
 
 
-def solids(
-    capsules: list[Capsule], cylinders: list[Cylinder]
-) -> tuple[tuple[coal.CollisionGeometry, np.ndarray, np.ndarray], ...]:
-    """Return coal's shapes with their rotation (3, 3) and position (3,) in the body's frame."""
-    solids = []
-    for capsule in capsules:
-        axis = capsule.end - capsule.start
-        length = float(np.linalg.norm(axis))
-        if length == 0.0:
-            solids.append((coal.Sphere(capsule.radius), np.eye(3), capsule.start))
-            continue
-        rotation = Rotation.align_vectors([axis / length], [[0.0, 0.0, 1.0]])[0].as_matrix()
-        solids.append((coal.Capsule(capsule.radius, length), rotation, 0.5 * (capsule.start + capsule.end)))
-    for cylinder in cylinders:
-        shape = coal.Cylinder(cylinder.radius, cylinder.length)
-        solids.append((shape, cylinder.placement[:3, :3], cylinder.placement[:3, 3]))
-    return tuple(solids)
+def _grown(radius: float, edge: float) -> float:
+    """Return the radius with which a polygon of such edges lies about a circle, as far outside as inside."""
+    return radius + edge**2 / (12 * radius)
 
 
-def ground_body(height: float) -> Body:
-    """Return the half-space below the world's z = ``height`` (m) as a body that rests in the world's frame."""
-    solid = coal.Halfspace(np.array([0.0, 0.0, 1.0]), height)
-    return Body("ground", 0.0, np.zeros(3), np.zeros((3, 3)), (), (), ((solid, np.eye(3), np.zeros(3)),))
+@dataclass(frozen=True)
+class Form:
+    """How task files and results state a shape that an object is made of.
 
-
-def is_capsule(capsule: Capsule, start: np.ndarray, end: np.ndarray, radius: float) -> bool:
-    """Whether a capsule has these ends, either way around, and this radius, to a millionth of its size."""
-    near = 1e-6 * max(radius, float(np.linalg.norm(end - start)))
-    straight = np.linalg.norm(capsule.start - start) + np.linalg.norm(capsule.end - end)
-    turned = np.linalg.norm(capsule.start - end) + np.linalg.norm(capsule.end - start)
-    return bool(min(straight, turned) < near and abs(capsule.radius - radius) < near)
-
-
-def swept_inertial(
-    slices: list[tuple[float, float, float, float]], middle: float, density: float
-) -> tuple[float, np.ndarray]:
-    """Return mass (kg) and inertia (3, 3) about ``z = middle`` of a solid of revolution about z.
-
-    Args:
-        slices: from z to z, m, and the radius at either end, m: equal for a cylinder, one zero for half a ball.
-        middle: m.
-        density: kg/m³.
+    Attributes:
+        shape: what it is.
+        points, sizes: names of its points and of its lengths.
     """
-    nodes, shares = np.polynomial.legendre.leggauss(5)
-    mass = along = across = 0.0
-    for low, high, first, last in slices:
-        z, weight = 0.5 * (low + high) + 0.5 * (high - low) * nodes, 0.5 * (high - low) * shares
-        flat = high if first < last else low
-        square = np.full_like(z, first**2) if first == last else max(first, last) ** 2 - (z - flat) ** 2
-        disc = np.pi * density * square * weight
-        mass += float(disc.sum())
-        along += float((disc * square / 2).sum())
-        across += float((disc * (square / 4 + (z - middle) ** 2)).sum())
-    return mass, np.diag([across, across, along])
+
+    shape: type[_Round]
+    points: tuple[str, ...]
+    sizes: tuple[str, ...] = ("radius",)
 
 
-_REQUEST = coal.DistanceRequest()
-_REQUEST.enable_signed_distance = True
-
-
-def body_distance(
-    first: Body, first_placed: tuple[np.ndarray, np.ndarray], second: Body, second_placed: tuple[np.ndarray, np.ndarray]
-) -> float:
-    """Return the signed distance of two placed bodies by coal, m; negative is the depth of their overlap.
-
-    Args:
-        first: one body.
-        first_placed: rotation (3, 3) and position (3,) of its frame in the world.
-        second: the other.
-        second_placed: likewise.
-    """
-    nearest = np.inf
-    for one, one_rotation, one_position in first.solids:
-        one_transform = _transform(first_placed, one_rotation, one_position)
-        for other, other_rotation, other_position in second.solids:
-            other_transform = _transform(second_placed, other_rotation, other_position)
-            result = coal.DistanceResult()
-            nearest = min(nearest, coal.distance(one, one_transform, other, other_transform, _REQUEST, result))
-    return nearest
-
-
-def _transform(placed: tuple[np.ndarray, np.ndarray], rotation: np.ndarray, position: np.ndarray) -> coal.Transform3s:
-    return coal.Transform3s(placed[0] @ rotation, placed[0] @ position + placed[1])
+FORMS = {
+    "sphere": Form(Capsule, ("center",)),
+    "capsule": Form(Capsule, ("start", "end")),
+}
+"""By the kind's name."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -144,7 +145,8 @@ def object_urdf(task: Task) -> str:
     link = _element(robot, "link", name="object")
     _inertial(link, task.object.mass, [0, 0, 0], np.asarray(task.object.inertia))
     for shape in task.object.shapes:
-        _capsule(link, *shape.segment, shape.radius)
+        kind, given = _shape_given(shape)
+        _SOLIDS[kind](link, given)
     return ElementTree.tostring(robot, encoding="unicode")
 
 
@@ -174,7 +176,7 @@ def result(task: Task, hand: Hand, samples: int) -> dict[str, Any]:
         "object": {
             "mass": task.object.mass,
             "inertia": np.asarray(task.object.inertia).tolist(),
-            "shapes": [_stated_shape(shape) for shape in task.object.shapes],
+            "shapes": [{"type": kind, **given} for kind, given in map(_shape_given, task.object.shapes)],
         },
         "friction": task.friction,
         "gravity": list(task.gravity),
@@ -195,11 +197,16 @@ def result(task: Task, hand: Hand, samples: int) -> dict[str, Any]:
     }
 
 
-def _stated_shape(shape: Any) -> dict[str, Any]:
-    start, end = (point.tolist() for point in shape.segment)
-    if start == end:
-        return {"type": "sphere", "center": start, "radius": shape.radius}
-    return {"type": "capsule", "start": start, "end": end, "radius": shape.radius}
+def _shape_given(shape: Any) -> tuple[str, dict[str, Any]]:
+    """A primitive's kind and what its task file says of it."""
+    ((kind, given),) = shape.model_dump(mode="json").items()
+    return kind, given
+
+
+_SOLIDS: dict[str, Callable[[ElementTree.Element, dict[str, Any]], None]] = {
+    "sphere": lambda link, given: _capsule(link, given["center"], given["center"], given["radius"]),
+    "capsule": lambda link, given: _capsule(link, given["start"], given["end"], given["radius"]),
+}
 
 
 MASS, RADIUS, TIP = 0.1, 0.02, 0.006

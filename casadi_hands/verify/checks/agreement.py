@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from casadi_hands.verify.bodies import Body, swept_inertial
 from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.reading.stored import as_array, entry, same
-from casadi_hands.verify.shapes import Body, is_capsule, swept_inertial
+from casadi_hands.verify.shapes import FORMS, Capsule, Cylinder, Shape
 
 STATUSES = ("certified", "feasible", "failed")
 
@@ -28,36 +29,46 @@ def object_problems(folder: Folder) -> list[str]:
             problems.append(f"inertia of the object: object.urdf and {source} disagree")
     if not np.all(np.abs(body.center_of_mass) <= 1e-6 * folder.length):
         problems.append("object.urdf: the link's frame is not the centre of mass")
-    shapes = [_ends_and_radius(shape) for shape in task.object.shapes]
-    if not all(any(is_capsule(capsule, *shape) for capsule in body.capsules) for shape in shapes):
+    return problems + _shape_problems(folder)
+
+
+def _shape_problems(folder: Folder) -> list[str]:
+    """Return where the object's shapes are not the same in the three files."""
+    problems, bodies = [], folder.object.shapes
+    given = [next(iter(shape.model_dump(mode="json").items())) for shape in folder.task.object.shapes]
+    shapes = [_shape(kind, numbers) for kind, numbers in given]
+    if not all(shape is not None and any(shape.agrees(body) for body in bodies) for shape in shapes):
         problems.append("shapes: object.urdf has not the shapes of task.yaml")
-    if not all(any(is_capsule(capsule, *shape) for shape in shapes) for capsule in body.capsules):
+    if not all(any(shape is not None and shape.agrees(body) for shape in shapes) for body in bodies):
         problems.append("shapes: object.urdf has a shape that is not in task.yaml")
-    if len(body.capsules) != len(shapes):
-        problems.append(f"shapes: object.urdf has {len(body.capsules)}, task.yaml has {len(shapes)}")
-    listed = entry(stated, "shapes")
+    if len(bodies) != len(shapes):
+        problems.append(f"shapes: object.urdf has {len(bodies)}, task.yaml has {len(shapes)}")
+    listed = entry(folder.result, "object", "shapes")
     if not isinstance(listed, list) or len(listed) != len(shapes):
         problems.append("shapes: result.json has not as many as task.yaml")
-    elif not all(_is_stated(item, *shape) for item, shape in zip(listed, shapes, strict=True)):
+    elif not all(_is_stated(item, *each) for item, each in zip(listed, given, strict=True)):
         problems.append("shapes: those of result.json are not those of task.yaml")
     return problems
 
 
-def _ends_and_radius(shape: Any) -> tuple[np.ndarray, np.ndarray, float]:
-    """A task's primitive as both ends of its axis, (3,) m, and its radius, m."""
-    start, end = (shape.start, shape.end) if hasattr(shape, "start") else (shape.center, shape.center)
-    return np.array(start), np.array(end), float(shape.radius)
+def _shape(kind: Any, numbers: Any) -> Shape | None:
+    """Return what a kind and its numbers state, or None where they state no shape that is measured."""
+    form = FORMS.get(kind) if isinstance(kind, str) else None
+    if form is None:
+        return None
+    points = [at for name in form.points if (at := as_array(entry(numbers, name), (3,))) is not None]
+    sizes = [float(size) for name in form.sizes if (size := as_array(entry(numbers, name), ())) is not None]
+    if (len(points), len(sizes)) != (len(form.points), len(form.sizes)):
+        return None
+    return form.shape.stated(points, sizes)
 
 
-def _is_stated(item: Any, start: np.ndarray, end: np.ndarray, radius: float) -> bool:
-    kind = "sphere" if np.array_equal(start, end) else "capsule"
-    if entry(item, "type") != kind:
+def _is_stated(item: Any, kind: str, numbers: dict[str, Any]) -> bool:
+    """Whether a result states a task's shape; a capsule of no length may be called a sphere."""
+    stated, due = _shape(entry(item, "type"), item), _shape(kind, numbers)
+    if stated is None or due is None or not due.agrees(stated):
         return False
-    names = ("center", "center") if kind == "sphere" else ("start", "end")
-    ends = [as_array(entry(item, name), (3,)) for name in names]
-    return all(
-        at is not None and np.linalg.norm(at - due) < 1e-6 * radius for at, due in zip(ends, (start, end), strict=True)
-    ) and same(entry(item, "radius"), radius)
+    return all(same(entry(item, name), numbers[name]) for name in FORMS[kind].sizes)
 
 
 def record_problems(folder: Folder) -> list[str]:
@@ -153,17 +164,17 @@ def _palm_body_problems(folder: Folder, body: Body, stated: Any) -> list[str]:
     for name, due in (("radius", palm.radius), ("thickness", palm.thickness)):
         if not same(entry(stated, name), due):
             problems.append(f"palm: result.json says {_brief(entry(stated, name))} m of {name}, the task {due:.6g} m")
-    disc = body.cylinders[0] if len(body.cylinders) == 1 and not body.capsules else None
-    if disc is None:
+    disc = body.shapes[0] if len(body.shapes) == 1 else None
+    if not isinstance(disc, Cylinder):
         return [*problems, "the palm: hand.urdf has not the one disc that it is"]
     if not (same(disc.radius, palm.radius) and same(disc.length, palm.thickness)):
         problems.append(
             f"the palm: hand.urdf has a disc of {1e3 * disc.radius:.4g} mm × {1e3 * disc.length:.4g} mm,"
             f" the task one of {1e3 * palm.radius:.4g} mm × {1e3 * palm.thickness:.4g} mm"
         )
-    middle, up = np.array([0.0, 0.0, -0.5 * palm.thickness]), np.array([0.0, 0.0, 1.0])
-    if np.linalg.norm(disc.placement[:3, 3] - middle) > 1e-6 * palm.radius or disc.placement[:3, 2] @ up < 1 - 1e-9:
+    elif not disc.agrees(Cylinder(np.array([0.0, 0.0, -palm.thickness]), np.zeros(3), palm.radius)):
         problems.append("the palm: its disc in hand.urdf is not behind the face with the fingers")
+    middle = np.array([0.0, 0.0, -0.5 * palm.thickness])
     rim = float(palm.radius)
     flat = [(-float(palm.thickness), 0.0, rim, rim)]
     return problems + _mass_problems(folder, "the palm", body, flat, middle)
@@ -179,12 +190,11 @@ def _link_problems(folder: Folder, name: str, stated: Any, parent: str, origin: 
         return [f"{who}: result.json states no length and radius"]
     problems = []
     capsule, tip = body.capsules[0], np.array([0.0, 0.0, float(length)])
-    if len(body.capsules) > 1 or body.cylinders:
+    if len(body.shapes) > 1:
         problems.append(f"{who}: hand.urdf has more than the one capsule that it is")
-    if not is_capsule(capsule, np.zeros(3), tip, float(radius)):
-        actual = float(np.linalg.norm(capsule.end - capsule.start))
+    if not capsule.agrees(Capsule(np.zeros(3), tip, float(radius))):
         problems.append(
-            f"{who}: hand.urdf has a capsule of {1e3 * actual:.4g} mm × {1e3 * capsule.radius:.4g} mm,"
+            f"{who}: hand.urdf has a capsule of {1e3 * capsule.length:.4g} mm × {1e3 * capsule.radius:.4g} mm,"
             f" result.json one of {1e3 * length:.4g} mm × {1e3 * radius:.4g} mm from its joint on"
         )
     if joint.child != name or joint.parent != parent:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from casadi_hands.verify.bodies import Body
 from casadi_hands.verify.checks.keyframes import keyframe_problems
 from casadi_hands.verify.reading.folder import Folder
-from casadi_hands.verify.reading.scene_file import Geom, Scene, SceneBody
+from casadi_hands.verify.reading.scene_file import Scene, SceneBody
 from casadi_hands.verify.reading.stored import same
-from casadi_hands.verify.shapes import Body, Capsule, is_capsule
 
 PATCH = 0.2
 """Torsional friction of a soft fingertip over sliding friction and link radius: (2/3) × a patch of 0.3 radii."""
@@ -56,8 +56,8 @@ def _world_problems(folder: Folder, scene: Scene) -> list[str]:
         problems.append(f"has {len(scene.planes)} solids beside hand and object; the task has {due}")
     elif ground is not None:
         plane = scene.planes[0]
-        if abs(plane.start[2] - ground.height) > EXACT * folder.length:
-            problems.append(f"the ground is at {plane.start[2]:.4g} m, in task.yaml at {ground.height:.4g} m")
+        if abs(plane.place[2] - ground.height) > EXACT * folder.length:
+            problems.append(f"the ground is at {plane.place[2]:.4g} m, in task.yaml at {ground.height:.4g} m")
         if not same(plane.friction[0], ground.friction) or np.any(plane.friction[1:]):
             problems.append(f"the ground's friction is {plane.friction.tolist()}, in task.yaml {ground.friction:g}")
         if not all(plane.priority > geom.priority for body in scene.bodies.values() for geom in body.geoms):
@@ -144,25 +144,11 @@ def _solid_problems(folder: Folder, who: str, body: SceneBody, due: Body) -> lis
         problems.append(f"the mass of {who} is {body.mass:.4g} kg, in {file} {due.mass:.4g} kg")
     if not same(body.inertia, due.inertia) or np.linalg.norm(body.center - due.center_of_mass) > EXACT * folder.length:
         problems.append(f"inertia or centre of mass of {who} is not that of {file}")
-    missing = [capsule for capsule in due.capsules if not any(_is_geom(geom, capsule) for geom in body.geoms)]
-    discs = [
-        cylinder
-        for cylinder in due.cylinders
-        if not any(
-            geom.kind == "cylinder"
-            and same(geom.radius, cylinder.radius)
-            and same(geom.end[2] - geom.start[2], cylinder.length)
-            and np.linalg.norm(0.5 * (geom.start + geom.end) - cylinder.placement[:3, 3]) < EXACT * cylinder.radius
-            for geom in body.geoms
-        )
-    ]
-    if missing or discs or len(body.geoms) != len(due.capsules) + len(due.cylinders):
+    found = [geom.shape for geom in body.geoms if geom.shape is not None]
+    missing = [shape for shape in due.shapes if not any(shape.agrees(other) for other in found)]
+    if missing or len(body.geoms) != len(due.shapes):
         problems.append(f"the solids of {who} are not those of {file}")
     return problems
-
-
-def _is_geom(geom: Geom, capsule: Capsule) -> bool:
-    return geom.kind in ("capsule", "sphere") and is_capsule(capsule, geom.start, geom.end, geom.radius)
 
 
 def _hold_problems(folder: Folder, scene: Scene) -> list[str]:

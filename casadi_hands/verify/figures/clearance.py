@@ -6,9 +6,9 @@ from itertools import combinations
 
 import numpy as np
 
+from casadi_hands.verify.bodies import Body, body_distance
 from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.report import Figure, worse
-from casadi_hands.verify.shapes import Body, body_distance
 from casadi_hands.verify.trajectory import DENSITY, Trajectory
 
 

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from casadi_hands.verify.bodies import body_distance
 from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.report import Figure, worse
-from casadi_hands.verify.shapes import body_distance
 from casadi_hands.verify.trajectory import DENSITY, Trajectory
 
 Placements = dict[str, tuple[np.ndarray, np.ndarray]]
@@ -31,11 +31,10 @@ def active_runs(folder: Folder, contact: int) -> list[tuple[int, int]]:
 
 def surface_normals(folder: Folder, placed: Placements, k: int, c: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the outward unit normals (3,), (3,) of object and link at a stored contact, world."""
-    motion, link = folder.motion, folder.motion.contact_link[c]
-    on_object = placed["object"][0][k] @ folder.object.normal(motion.contact_point_object[k, c])
-    if link == "ground":
-        return on_object, np.array([0.0, 0.0, 1.0])
-    return on_object, placed[link][0][k] @ folder.links[link].normal(motion.contact_point_link[k, c])
+    motion = folder.motion
+    on_object = folder.object.normal(motion.contact_point_object[k, c])
+    on_link = folder.partner(c).normal(motion.contact_point_link[k, c])
+    return placed["object"][0][k] @ on_object, placed[motion.contact_link[c]][0][k] @ on_link
 
 
 def friction_figures(folder: Folder, placed: Placements) -> list[Figure]:
@@ -81,16 +80,10 @@ def gap_at_samples(folder: Folder, placed: Placements) -> Figure:
         rotation, position = placed["object"][0][k], placed["object"][1][k]
         link_placed = placed[link][0][k], placed[link][1][k]
         apart = float(np.linalg.norm(rotation @ on_object + position - link_placed[0] @ on_link - link_placed[1]))
-        ground = folder.ground if link == "ground" else None
-        other = ground or folder.links[link]
-        off_link = (
-            on_link[2] - float(folder.task.ground.height)
-            if folder.task.ground and ground
-            else (other.surface_distance(on_link))
-        )
+        other = folder.partner(c)
         cases = (
             (abs(folder.object.surface_distance(on_object)), "is {value} off the object's surface"),
-            (abs(off_link), f"is {{value}} off the surface of {folder.call(link)}"),
+            (abs(other.surface_distance(on_link)), f"is {{value}} off the surface of {folder.call(link)}"),
             (apart, f"is at two places {{value}} apart on the object and on {folder.call(link)}"),
             (body_distance(folder.object, (rotation, position), other, link_placed), "has a gap of {value}"),
         )
@@ -106,9 +99,9 @@ def gap_between_samples(folder: Folder, path: Trajectory) -> Figure:
     gaps = np.zeros(len(motion.time) - 1)
     for c, name in enumerate(motion.contact_names):
         link = motion.contact_link[c]
-        other = folder.ground if link == "ground" else folder.links[link]
+        other = folder.partner(c)
         for i in map(int, np.flatnonzero(motion.contact_active[path.interval, c])):
-            if other is None or i % DENSITY == 0:
+            if i % DENSITY == 0:
                 continue
             distance = body_distance(folder.object, path.at("object", i), other, path.at(link, i))
             gaps[path.interval[i]] = max(gaps[path.interval[i]], distance)

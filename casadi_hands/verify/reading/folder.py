@@ -15,10 +15,11 @@ import pinocchio as pin
 from casadi_hands.errors import DesignError
 from casadi_hands.problem.motion import Motion
 from casadi_hands.task import Task, load_task
+from casadi_hands.verify.bodies import Body, ground_body
 from casadi_hands.verify.reading.robot import Joint, Robot, read_robot
 from casadi_hands.verify.reading.scene_file import Scene, read_scene
 from casadi_hands.verify.reading.stored import read_motion, read_record
-from casadi_hands.verify.shapes import Body, ground_body
+from casadi_hands.verify.shapes import FORMS
 
 STANDARD_GRAVITY = 9.81
 """m/s²; scales forces when the task has no gravity."""
@@ -64,9 +65,8 @@ class Folder:
     @cached_property
     def length(self) -> float:
         """Half the object's largest extent, m: the unit of lever arms."""
-        low = np.min([np.minimum(s.start, s.end) - s.radius for s in self.object.capsules], axis=0)
-        high = np.max([np.maximum(s.start, s.end) + s.radius for s in self.object.capsules], axis=0)
-        return 0.5 * float(np.max(high - low))
+        boxes = np.array([shape.box for shape in self.object.shapes])
+        return 0.5 * float(np.max(boxes[:, 1].max(axis=0) - boxes[:, 0].min(axis=0)))
 
     @cached_property
     def gravity(self) -> np.ndarray:
@@ -92,6 +92,14 @@ class Folder:
     def fingers(self) -> list[str]:
         """The task's names of the hand's fingers; a finger of the task whose contact never acts is not built."""
         return [name for name in self.task.fingers if name in self.motion.contact_names]
+
+    def partner(self, contact: int) -> Body:
+        """Return the body that the object touches at the contact with this index: a link, or the ground."""
+        link = self.motion.contact_link[contact]
+        if link != "ground":
+            return self.links[link]
+        assert self.ground is not None  # or the folder would not have been read
+        return self.ground
 
     @property
     def legacy(self) -> bool:
@@ -179,8 +187,9 @@ def _object(path: Path, robot: Robot) -> Body:
         found = ", ".join([*(f"'{name}'" for name in robot.links), *(f"joint '{name}'" for name in robot.joints)])
         raise DesignError(f"{path}: holds {found or 'no link'}; it must hold one link 'object' and nothing else")
     body = robot.links["object"]
-    if not body.capsules or body.cylinders:
-        raise DesignError(f"{path}: no link 'object' made of spheres and capsules")
+    if not body.shapes or not {type(shape) for shape in body.shapes} <= {form.shape for form in FORMS.values()}:
+        *kinds, last = (f"{kind}s" for kind in FORMS)
+        raise DesignError(f"{path}: no link 'object' made of {', '.join(kinds)} and {last}")
     return body
 
 

@@ -10,8 +10,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.errors import DesignError
+from casadi_hands.verify.bodies import Body, joined
 from casadi_hands.verify.reading.markup import called, name_of, number, numbers, only, positive, read_xml, strangers
-from casadi_hands.verify.shapes import Body, Capsule, Cylinder, merge, solids
+from casadi_hands.verify.shapes import Capsule, Cylinder
 
 
 @dataclass(frozen=True)
@@ -150,7 +151,7 @@ def _placement(path: Path, element: Element) -> np.ndarray:
 
 def _read_link(path: Path, name: str, link: Element) -> tuple[Body, list[str]]:
     strange = list(strangers(link, "inertial visual collision", "name"))
-    shapes = {}
+    found: dict[str, tuple[list[Capsule], list[Cylinder]]] = {}
     for role in ("collision", "visual"):
         spheres: list[Capsule] = []
         cylinders: list[Cylinder] = []
@@ -159,12 +160,10 @@ def _read_link(path: Path, name: str, link: Element) -> tuple[Body, list[str]]:
             for color in element.iter("color"):
                 numbers(path, color, "rgba", 4)
             _read_shape(path, name, element, spheres, cylinders)
-        shapes[role] = spheres, cylinders
-    if not _alike(*shapes["collision"], *shapes["visual"]):
+        found[role] = spheres, cylinders
+    if _rows(*found["collision"]) != _rows(*found["visual"]):
         strange.append(f"link {name} looks other than it collides: its visual geometry is not its collision geometry")
-    capsules, bare = merge(*shapes["collision"])
-    mass, center, inertia = _inertial(path, name, link)
-    return Body(name, mass, center, inertia, tuple(capsules), tuple(bare), solids(capsules, bare)), strange
+    return Body(name, *_inertial(path, name, link), joined(*found["collision"])), strange
 
 
 def _read_shape(path: Path, name: str, element: Element, spheres: list[Capsule], cylinders: list[Cylinder]) -> None:
@@ -175,22 +174,16 @@ def _read_shape(path: Path, name: str, element: Element, spheres: list[Capsule],
     if shape.tag == "sphere":
         spheres.append(Capsule(placement[:3, 3], placement[:3, 3], positive(path, shape, "radius")))
     elif shape.tag == "cylinder":
-        cylinders.append(Cylinder(placement, positive(path, shape, "radius"), positive(path, shape, "length")))
+        radius, reach = positive(path, shape, "radius"), 0.5 * positive(path, shape, "length") * placement[:3, 2]
+        cylinders.append(Cylinder(placement[:3, 3] - reach, placement[:3, 3] + reach, radius))
     else:
         raise DesignError(f"{path}: link {name}: its {element.tag} geometry is neither sphere nor cylinder")
 
 
-def _alike(
-    spheres: list[Capsule], cylinders: list[Cylinder], other_spheres: list[Capsule], other_cylinders: list[Cylinder]
-) -> bool:
-    """Whether two lists of shapes are the same, in any order."""
-
-    def rows(spheres: list[Capsule], cylinders: list[Cylinder]) -> list[tuple[float, ...]]:
-        found = [np.array([s.radius, 0.0, *s.start, 0.0, 0.0, 0.0]) for s in spheres]
-        found += [np.array([c.radius, c.length, *c.placement[:3, 3], *c.placement[:3, 2]]) for c in cylinders]
-        return sorted(tuple(np.round(row, 9).tolist()) for row in found)
-
-    return rows(spheres, cylinders) == rows(other_spheres, other_cylinders)
+def _rows(spheres: list[Capsule], cylinders: list[Cylinder]) -> list[tuple[float, ...]]:
+    """Return numbers by which shapes are compared, in an order of their own."""
+    rows = [np.array([shape.radius, *shape.start, *shape.end]) for shape in (*spheres, *cylinders)]
+    return sorted(tuple(np.round(row, 9).tolist()) for row in rows)
 
 
 def _inertial(path: Path, name: str, link: Element) -> tuple[float, np.ndarray, np.ndarray]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from casadi_hands.errors import DesignError
 from casadi_hands.verify.reading.markup import called, name_of, number, numbers, only, positive, read_xml, strangers
+from casadi_hands.verify.shapes import Capsule, Cylinder, Shape
 
 _SECTIONS = "compiler option statistic default worldbody contact equality actuator keyframe visual asset"
 _OPTIONS = "timestep gravity integrator cone impratio noslip_iterations iterations tolerance solver"
@@ -24,16 +25,15 @@ class Geom:
 
     Attributes:
         kind: ``sphere``, ``capsule``, ``cylinder`` or ``plane``.
-        start, end: (3,) ends of its axis, m, body frame; of a plane, a point of it, twice.
-        radius: m.
+        place: (3,) m, where the file puts it, body frame; of a plane, a point of it.
+        shape: what it is; None of a plane, or of what the format does not have.
         friction: (3,) sliding, torsional (m) and rolling (m).
         priority: whose friction holds where two touch.
     """
 
     kind: str
-    start: np.ndarray
-    end: np.ndarray
-    radius: float
+    place: np.ndarray
+    shape: Shape | None
     friction: np.ndarray
     priority: float
 
@@ -229,20 +229,18 @@ def _read_geom(path: Path, scene: Scene, element: Element) -> Geom:
     scene.strange.extend(strangers(element, "", _GEOM))
     kind = element.get("type", "sphere")
     place = numbers(path, element, "pos", 3, "0 0 0")
-    start = end = place
-    radius = 0.0
-    if kind == "capsule":
+    shape: Shape | None = None
+    if kind == "sphere":
+        shape = Capsule(place, place, positive(path, element, "size"))
+    elif kind == "capsule" or (kind == "cylinder" and element.get("fromto") is not None):
         ends = numbers(path, element, "fromto", 6)
-        start, end = ends[:3], ends[3:]
-        radius = positive(path, element, "size")
-    elif kind == "sphere":
-        radius = positive(path, element, "size")
+        shape = (Capsule if kind == "capsule" else Cylinder)(ends[:3], ends[3:], positive(path, element, "size"))
     elif kind == "cylinder":
         radius, half = numbers(path, element, "size", 2)
         reach = np.array([0.0, 0.0, half])
-        start, end = place - reach, place + reach
+        shape = Cylinder(place - reach, place + reach, float(radius))
     elif kind != "plane":
         scene.strange.append(f"{called(element)} is a {kind}, which the format does not have")
     _read_looks(path, element)
     friction = numbers(path, element, "friction", 3, _FRICTION)
-    return Geom(kind, start, end, radius, friction, number(path, element, "priority", "0"))
+    return Geom(kind, place, shape, friction, number(path, element, "priority", "0"))

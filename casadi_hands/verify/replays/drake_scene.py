@@ -15,7 +15,7 @@ from casadi_hands.errors import DesignError, HandsError
 from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.replays.perturb import Perturbation
 from casadi_hands.verify.replays.simulation import one_line
-from casadi_hands.verify.shapes import Capsule
+from casadi_hands.verify.shapes import Shape
 
 PRESS = 6.0
 """Of the object's weight: what presses a fingertip to a patch of PATCH, so that it gives as much as MuJoCo's."""
@@ -122,7 +122,7 @@ class Shapes:
     def __init__(self, drake: Any, plant: Any, folder: Folder, factor: float) -> None:
         self._drake, self._plant, self._folder = drake, plant, folder
         tips = [shape.radius for name, body in folder.links.items() if name != "palm" for shape in body.capsules]
-        thin = min(shape.radius for shape in folder.object.capsules)
+        thin = min(shape.radius for shape in folder.object.shapes)
         tip = max(tips, default=thin)
         relative = tip * thin / (tip + thin)
         self._depth = (PATCH * tip) ** 2 / (2 * relative)
@@ -134,63 +134,31 @@ class Shapes:
 
     def add(self, hand: Any, item: Any) -> None:
         """Add the shapes of hand and object, and the ground."""
-        geometry, folder, plant = self._drake.geometry, self._folder, self._plant
+        folder, plant = self._folder, self._plant
         for name, link in folder.links.items():
             body, friction = plant.GetBodyByName(name, hand), self._partner(self._mu)
-            for k, capsule in enumerate(link.capsules):
-                self._add_capsule(body, f"{name}{k}", capsule, friction)
-            for k, disc in enumerate(link.cylinders):
-                turn = Rotation.from_matrix(disc.placement[:3, :3])
-                shape = geometry.Cylinder(disc.radius, disc.length)
-                self._add(
-                    body, f"{name}_disc{k}", turn, disc.placement[:3, 3], shape, self._rigid(friction, disc.radius)
-                )
-        for k, capsule in enumerate(folder.object.capsules):
-            self._add_capsule(plant.GetBodyByName("object", item), f"object{k}", capsule, self._own)
-        if folder.task.ground is not None:
-            at, rigid = (
-                np.array([0.0, 0.0, folder.task.ground.height]),
-                self._rigid(self._partner(self._ground_mu), 1.0),
-            )
-            self._add(plant.world_body(), "ground", Rotation.identity(), at, geometry.HalfSpace(), rigid)
+            for k, shape in enumerate(link.shapes):
+                self._add_shape(body, f"{name}{k}", shape, friction, soft=name != "palm")
+        for k, shape in enumerate(folder.object.shapes):
+            self._add_shape(plant.GetBodyByName("object", item), f"object{k}", shape, self._own)
+        if folder.ground is not None:
+            for shape in folder.ground.shapes:
+                self._add_shape(plant.world_body(), "ground", shape, self._partner(self._ground_mu), soft=False)
 
     def _partner(self, friction: float) -> float:
         """Return the coefficient that combines with the object's to this one."""
         return friction * self._own / (2 * self._own - friction) if self._own > 0 else 0.0
 
-    def _add_capsule(self, body: Any, name: str, capsule: Capsule, friction: float) -> None:
-        """Add a capsule, or a sphere where it has no length, soft."""
-        axis = capsule.end - capsule.start
-        length, radius, off = float(np.linalg.norm(axis)), capsule.radius, SAGITTA * self._depth
-        # Drake's meshes have their corners on the surface, so they lie inside; grown, they lie about it.
-        if length > 0.0:
-            edge = min(np.sqrt(8 * radius * off), np.pi / 4 * radius)
-            radius += edge**2 / (12 * radius)
-            shape = self._drake.geometry.Capsule(radius, length)
-            turn = Rotation.align_vectors([axis / length], [[0.0, 0.0, 1.0]])[0]
+    def _add_shape(self, body: Any, name: str, shape: Shape, friction: float, soft: bool = True) -> None:
+        geometry, edge = self._drake.geometry, shape.edge(SAGITTA * self._depth) if soft else 0.0
+        properties = geometry.ProximityProperties()
+        if soft:
+            # Two gradients in series make one of half their size; a modulus is the pressure where it is deepest.
+            geometry.AddCompliantHydroelasticProperties(edge, 2 * self._gradient * shape.depth, properties)
         else:
-            halvings = max(round(np.log2(0.5 * radius / off) / 2), 2)
-            edge = 1.01 * np.pi / 2 * radius / 2**halvings
-            radius *= 1 + 0.5 / 4**halvings
-            shape, turn = self._drake.geometry.Sphere(radius), Rotation.identity()
-        properties = self._material(friction)
-        # Two gradients in series make one of half their size; a modulus is the pressure on the capsule's axis.
-        modulus = 2 * self._gradient * capsule.radius
-        self._drake.geometry.AddCompliantHydroelasticProperties(edge, modulus, properties)
-        self._add(body, name, turn, (capsule.start + capsule.end) / 2, shape, properties)
-
-    def _rigid(self, friction: float, edge: float) -> Any:
-        properties = self._material(friction)
-        self._drake.geometry.AddRigidHydroelasticProperties(edge, properties)
-        return properties
-
-    def _material(self, friction: float) -> Any:
-        properties = self._drake.geometry.ProximityProperties()
+            geometry.AddRigidHydroelasticProperties(min(shape.radius, 1.0), properties)
         coulomb = self._drake.multibody.plant.CoulombFriction(friction, friction)
-        dissipation = RELAXATION / self._depth
-        self._drake.geometry.AddContactMaterial(dissipation=dissipation, friction=coulomb, properties=properties)
-        return properties
-
-    def _add(self, body: Any, name: str, turn: Rotation, at: np.ndarray, shape: Any, properties: Any) -> None:
-        place = transform(self._drake, turn, at)
-        self._plant.RegisterCollisionGeometry(body, place, shape, name, properties)
+        geometry.AddContactMaterial(dissipation=RELAXATION / self._depth, friction=coulomb, properties=properties)
+        turn, at = shape.pose
+        place = transform(self._drake, Rotation.from_matrix(turn), at)
+        self._plant.RegisterCollisionGeometry(body, place, shape.drake(geometry, edge), name, properties)
