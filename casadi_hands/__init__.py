@@ -9,16 +9,18 @@ if TYPE_CHECKING:
     from casadi_hands.export.design import Design
     from casadi_hands.pipeline import solve
     from casadi_hands.pipeline.alternatives import explore
+    from casadi_hands.pipeline.formulate import formulate
     from casadi_hands.task import load_task
     from casadi_hands.verify import audit, replay
 
 __version__ = "0.1.0"
-__all__ = ["Design", "audit", "explore", "load_task", "replay", "solve"]
+__all__ = ["Design", "audit", "explore", "formulate", "load_task", "replay", "solve"]
 
 _HOME = {
     "Design": "casadi_hands.export.design",
     "audit": "casadi_hands.verify",
     "explore": "casadi_hands.pipeline.alternatives",
+    "formulate": "casadi_hands.pipeline.formulate",
     "load_task": "casadi_hands.task",
     "replay": "casadi_hands.verify",
     "solve": "casadi_hands.pipeline",

@@ -31,7 +31,7 @@ from casadi_hands.problem.model import Model, sizes
 from casadi_hands.problem.si import build_model
 from casadi_hands.stages.floating.stage import FloatingStage
 from casadi_hands.stages.object_motion.values import object_parameters, term_weights
-from casadi_hands.stages.refine.settings import LONG_WAY
+from casadi_hands.stages.refine.settings import ALL_STEPS
 from casadi_hands.stages.refine.stage import RefineStage
 from casadi_hands.stages.refine.values import Margin
 from casadi_hands.stages.synthesis.seeds import random_finger
@@ -231,7 +231,7 @@ def _straight(task: Task, model: Model) -> Floating:
         point=start["point"].reshape(keyframes, contacts, 3),
         force=start["force"].reshape(samples, contacts, 3),
         active=np.ones((keyframes, contacts), bool),
-        activity=start["activity"],
+        invariant=start["invariant"],
         threshold=0.0,
         solution=solution,
         runs=(),
@@ -268,11 +268,11 @@ def _refine(task: Task, model: Model, size: Size) -> Measured:
     whole = WholeHandStage(model, contacts, joints, False)
     start = whole.solve(floating, tuple(alone), dict(task.weights.whole_hand), replace(WHOLE, max_iter=40))
 
-    way = tuple((what, weight, replace(how, max_iter=ITERATIONS)) for what, weight, how in LONG_WAY)
+    way = tuple((what, weight, replace(how, max_iter=ITERATIONS)) for what, weight, how in ALL_STEPS)
 
     def iterate(stage: RefineStage) -> list[Solution]:
         # What few iterations leave is no start for a projection, which is another problem.
-        with patch.object(RefineStage, "_projected", lambda _, solution, *__: solution):
+        with patch.object(RefineStage, "_restored", lambda _, solution, *__: solution):
             return [run.solution for run in stage.take(way, start, Margin()).runs]
 
     return lambda: RefineStage(model, contacts, joints, start.active), iterate

@@ -49,7 +49,13 @@ def main() -> None:
         joints = "+".join(str(len(finger.links)) for finger in design.hand.fingers)
         played = {name: run_replays(folder, PERTURBED, 0, given.jobs, name) for name in ("mujoco", "drake")}
         rows.append(
-            (design.task.name, joints, f"{1e3 * held(folder):.2f}", apart(folder, design), *loaded(folder, design))
+            (
+                design.task.name,
+                joints,
+                f"{1e3 * zero_order_hold(folder):.2f}",
+                apart(folder, design),
+                *loaded(folder, design),
+            )
         )
         first, second = (drops_of(played[name]) for name in played)
         agree = [a == b for a, b in zip(first, second, strict=True)]
@@ -69,7 +75,7 @@ def main() -> None:
         given.out.write_text(text, encoding="utf-8")
 
 
-def held(folder: Path) -> float:
+def zero_order_hold(folder: Path) -> float:
     """How far the object moves, m, in two seconds at the keyframe ``start``, by MuJoCo alone."""
     model = mujoco.MjModel.from_xml_path(str(folder / "scene.xml"))
     data = mujoco.MjData(model)

@@ -22,8 +22,8 @@ MOMENTS = 5
 SIZE = (528, 396)
 """Width and height, pixels."""
 _JOINT = 1.12  # radius of a joint's ball over its link's: so that joints can be counted
-_DOT = 0.07  # radius of a goal point over the object's half extent
-_ARROW = 1.3  # length of the longest force arrow over the object's half extent
+_DOT = 0.07  # radius of a goal point over the object's characteristic length
+_ARROW = 1.3  # length of the longest force arrow over the object's characteristic length
 
 
 def kept_stills(design: Design, folder: Path) -> list[tuple[float, bytes]]:
@@ -128,7 +128,7 @@ def _goals(design: Design) -> list[Capsule]:
     if task.tool is None:
         return [body for pose in goal_poses(task) for body in _object_at(design, pose, GOAL_COLOR, checked=False)]
     points = [np.array(goal.tool_at) for goal in task.motion]
-    return [Capsule(point, point, _DOT * task.object.half_extent, GOAL_COLOR) for point in points]
+    return [Capsule(point, point, _DOT * task.object.characteristic_length, GOAL_COLOR) for point in points]
 
 
 def _draw_goals(picture: np.ndarray, distance: np.ndarray, camera: Camera, design: Design, timeline: Timeline) -> None:
@@ -140,7 +140,7 @@ def _draw_goals(picture: np.ndarray, distance: np.ndarray, camera: Camera, desig
             overlay(picture, distance, camera, goals[k : k + pieces], 0.13, False)
         return
     path = timeline.object[:, :3, :3] @ np.array(tool) + timeline.object[:, :3, 3]
-    width = _DOT / 3 * design.task.object.half_extent
+    width = _DOT / 3 * design.task.object.characteristic_length
     line = [Capsule(a, b, width, GOAL_COLOR) for a, b in pairwise(path)]
     overlay(picture, distance, camera, [*goals, *line], 0.9, False)
 
@@ -150,7 +150,7 @@ def _arrows(design: Design, timeline: Timeline, sample: int) -> list[Capsule]:
     motion = design.motion
     if motion is None:
         return []
-    size = design.task.object.half_extent
+    size = design.task.object.characteristic_length
     pose = timeline.object[sample]
     forces = [(motion.contact_point_object[sample, c], motion.contact_force[sample, c], FORCE_COLOR)
               for c in range(len(motion.contact_names))]  # fmt: skip

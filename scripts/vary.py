@@ -22,7 +22,7 @@ from casadi_hands.task.yamlfile import TaskFile, read
 SIZE, MASS, GOAL, TURN, CONTACT = 0.2, 0.3, 0.2, 0.2, 15.0
 """Largest change: shares, and degrees for contacts."""
 _TRIES = 200
-_RESTING = 1e-3  # half extents above the ground: less is the rounding of numbers typed by hand
+_RESTING = 1e-3  # lengths above the ground: less is the rounding of numbers typed by hand
 _DIGITS = 9
 
 
@@ -191,7 +191,7 @@ def _vary_motion(
             vector = scaled_turn(first, rotation.vector, change.turn)
             if height is not None:
                 clearance = _clearance(body, np.array(old["position"]), rotation.matrix, height)
-                rests = abs(clearance) <= _RESTING * body.half_extent
+                rests = abs(clearance) <= _RESTING * body.characteristic_length
                 turned = rotation_matrix(vector)
                 lowest = turned @ (change.size * body.lowest_point(turned))
                 place[2] = height + (0.0 if rests else change.goal * clearance) - lowest[2]

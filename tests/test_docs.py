@@ -154,7 +154,7 @@ def smallest() -> str:
 
 def test_task_of_the_readme_loads() -> None:
     task = parse_task(smallest())
-    assert task.object.half_extent == pytest.approx(0.06)
+    assert task.object.characteristic_length == pytest.approx(0.06)
     assert tuple(task.fingers) == ("left", "right")
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 from contextlib import ExitStack
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -13,6 +12,7 @@ import typer
 from rich.console import Console
 
 from casadi_hands import __version__
+from casadi_hands.cli.options import Folder, Jobs, Seed, Stage, TaskFile
 
 app = typer.Typer(
     name="casadi-hands",
@@ -24,25 +24,6 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-
-
-class Stage(StrEnum):
-    """The stages of a solve, in order (``casadi_hands.pipeline.STAGES``)."""
-
-    FLOATING = "floating"
-    SYNTHESIS = "synthesis"
-    WHOLE_HAND = "whole_hand"
-    REFINE = "refine"
-
-
-TaskFile = Annotated[Path, typer.Argument(metavar="TASK", help="A task file (YAML).", show_default=False)]
-Folder = Annotated[
-    Path, typer.Argument(metavar="DIR", help="A folder that `casadi-hands solve` wrote.", show_default=False)
-]
-Jobs = Annotated[
-    int | None,
-    typer.Option(min=1, help="Processes to use; the result does not depend on it.", show_default="all cores"),
-]
 
 
 def _print_version(wanted: bool) -> None:
@@ -69,9 +50,7 @@ def solve(
             help="Folder to write; files of an earlier design in it are replaced.", show_default="results/TASK"
         ),
     ] = None,
-    seed: Annotated[
-        int | None, typer.Option(min=0, help="Seed of the random numbers.", show_default="the task's")
-    ] = None,
+    seed: Seed = None,
     seeds: Annotated[
         int,
         typer.Option(
@@ -167,6 +146,31 @@ def solve(
     if ranked:
         console.print(alternatives_summary(ranked, folder))
     raise typer.Exit(1 if design.status == "failed" else 0)
+
+
+@app.command()
+def formulate(
+    task: TaskFile,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder to write.", show_default=False)],
+    stage: Annotated[Stage, typer.Option(help="Whose program.")] = Stage.REFINE,
+    seed: Seed = None,
+    jobs: Jobs = None,
+) -> None:
+    """Run the stages up to one, write the nonlinear program it poses, for CasADi alone, and print where its page is."""
+    from casadi_hands.cli.interrupt import leave_on_interrupt
+    from casadi_hands.cli.progress import Reporter
+    from casadi_hands.task import load_task
+
+    problem, reporter = load_task(task), Reporter(Console(stderr=True))
+
+    def stopped() -> None:
+        reporter.stop()
+        reporter.note("stopped; nothing was written")
+
+    with leave_on_interrupt(stopped), reporter:
+        from casadi_hands.pipeline.formulate import formulate
+
+        print(formulate(problem, stage.value, seed, jobs=jobs, progress=reporter.progress).save(out))
 
 
 @app.command()

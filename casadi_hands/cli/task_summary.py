@@ -46,7 +46,7 @@ def _lines(task: Task) -> Iterator[tuple[str, str]]:
             f"at most {search.max_joints} joints a finger, seed {search.seed}"
         ),
     )
-    usual = Limits(replay_position=usual_replay_position(task.object.half_extent))
+    usual = Limits(replay_position=usual_replay_position(task.object.characteristic_length))
     changed = {name: value for name, value in task.limits if value != getattr(usual, name)}
     if changed:
         yield (
@@ -58,7 +58,7 @@ def _lines(task: Task) -> Iterator[tuple[str, str]]:
 def _object(task: Task) -> str:
     kinds = Counter(shape.body.kind for shape in task.object.shapes)
     shapes = " and ".join(f"{count} {kind}{'s' * (count > 1)}" for kind, count in sorted(kinds.items()))
-    return f"{task.object.mass:g} kg; {shapes}, {2e3 * task.object.half_extent:.4g} mm at its longest"
+    return f"{task.object.mass:g} kg; {shapes}, {2e3 * task.object.characteristic_length:.4g} mm at its longest"
 
 
 def _palm(task: Task) -> str:

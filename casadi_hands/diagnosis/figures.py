@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from casadi_hands.diagnosis.holding import HELD, MOST_GRIP, grips, least_friction, least_torque
+from casadi_hands.diagnosis.holding import HELD, MOST_NORMAL_FORCE, holdings, least_friction, least_torque
 from casadi_hands.diagnosis.moment import moment
 from casadi_hands.diagnosis.reason import Reason
 from casadi_hands.diagnosis.shortcoming import WITHOUT_CONTACT
@@ -19,14 +19,14 @@ from casadi_hands.verify import Audit
 from casadi_hands.verify.replays.series import stronger_motors
 from casadi_hands.verify.report import Figure, show
 
-# Figures that follow where the hand cannot grip: a refinement in vain ends anywhere.
-_GRIP = WITHOUT_CONTACT | {"torque"}
+# Figures that follow where the hand cannot holding: a refinement in vain ends anywhere.
+_HOLDING = WITHOUT_CONTACT | {"torque"}
 
 
 def friction_reason(model: Model, floating: Floating) -> Reason | None:
     """Whether the contacts cannot hold the object with this friction, or only with fingers that press very hard."""
-    found = grips(model, floating)
-    k = int(np.argmax([np.linalg.norm(grip.missing) for grip in found]))
+    found = holdings(model, floating)
+    k = int(np.argmax([np.linalg.norm(holding.missing) for holding in found]))
     worst, when = found[k], moment(model.schedule, model.schedule.keyframes[k])
     if not worst.held:
         force, torque = (float(np.linalg.norm(part)) for part in (worst.missing[:3], worst.missing[3:]))
@@ -37,9 +37,9 @@ def friction_reason(model: Model, floating: Floating) -> Reason | None:
             f"{' and '.join(missing)} {'are' if len(missing) > 1 else 'is'} missing"
         )
     else:
-        k = int(np.argmax([grip.hardest for grip in found]))
+        k = int(np.argmax([holding.hardest for holding in found]))
         worst, when = found[k], moment(model.schedule, model.schedule.keyframes[k])
-        if worst.hardest <= MOST_GRIP:
+        if worst.hardest <= MOST_NORMAL_FORCE:
             return None
         what = (
             f"at {when} the contacts hold the object with friction {model.friction:g} only if they press with "
@@ -50,9 +50,9 @@ def friction_reason(model: Model, floating: Floating) -> Reason | None:
     advice = (
         contacts
         if least is None
-        else f"friction of {least:.2g} or more, with which {MOST_GRIP:g} weights would do, or {contacts}"
+        else f"friction of {least:.2g} or more, with which {MOST_NORMAL_FORCE:g} weights would do, or {contacts}"
     )
-    return Reason(what, advice, _GRIP, root=True)
+    return Reason(what, advice, _HOLDING, root=True)
 
 
 def torque_reason(model: Model, design: Result) -> Reason | None:
@@ -69,7 +69,7 @@ def torque_reason(model: Model, design: Result) -> Reason | None:
         f"load, and the motors give {given:.3g} N·m"
     )
     advice = "stronger motors (actuator.torque), a lighter object, more friction or a palm nearer by"
-    return Reason(what, advice, _GRIP, root=True)
+    return Reason(what, advice, _HOLDING, root=True)
 
 
 def speed_reason(model: Model, design: Result) -> Reason | None:

@@ -22,23 +22,25 @@ from casadi_hands.problem.model import Model
 from casadi_hands.problem.result import Result
 from casadi_hands.stages.floating.gate import needed_wrenches
 from casadi_hands.statics.grasp import grasp_map, spread_forces
-from casadi_hands.statics.joints import passive_projector
+from casadi_hands.statics.joints import structural_projector
 from casadi_hands.statics.programmes import least_largest, least_largest_solution
 from casadi_hands.terms.finger import NULL_SPACE_DAMPING
 
 Array = NDArray[np.float64]
-HELD = 0.05  # m·g and m·g·half extent of missing wrench, that the floating stage lets pass too
-MOST_GRIP = 2.0  # m·g, the firmest grip that a refinement asks for; where more is needed, friction is too low
+HELD = 0.05  # m·g and m·g·length of missing wrench, that the floating stage lets pass too
+MOST_NORMAL_FORCE = (
+    2.0  # m·g, the firmest holding that a refinement asks for; where more is needed, friction is too low
+)
 MOST_FRICTION = 4.0  # beyond that of any fingertip
 _SPARE = 1e-6  # by which the second of two linear programmes may miss the optimum of the first
 
 
 @dataclass(frozen=True)
-class Grip:
+class Holding:
     """What holding the object takes at a keyframe.
 
     Attributes:
-        missing: (6,) wrench that the contacts cannot make, m·g and m·g·half extent, object frame.
+        missing: (6,) wrench that the contacts cannot make, m·g and m·g·length, object frame.
         hardest: the least that the hardest-pressed contact must press with to make the rest, m·g.
     """
 
@@ -51,7 +53,7 @@ class Grip:
         return float(np.linalg.norm(self.missing)) <= HELD
 
 
-def grips(model: Model, floating: Floating, friction: float | None = None) -> tuple[Grip, ...]:
+def holdings(model: Model, floating: Floating, friction: float | None = None) -> tuple[Holding, ...]:
     """What holding the object takes at each keyframe of a floating motion.
 
     Args:
@@ -73,18 +75,20 @@ def grips(model: Model, floating: Floating, friction: float | None = None) -> tu
         # Normal forces: every edge has one of unit length.
         count = int(active.sum())
         normal = np.asarray(np.kron(np.eye(count), np.ones(forces.shape[1] // count)), float)
-        found.append(Grip(needed - made, least_largest(normal, wrenches, made)))
+        found.append(Holding(needed - made, least_largest(normal, wrenches, made)))
     return tuple(found)
 
 
 def least_friction(model: Model, floating: Floating) -> float | None:
-    """The least friction with which the contacts hold the object at every keyframe, none pressed beyond ``MOST_GRIP``.
+    """The least friction with which the contacts hold the object at every keyframe, pressed within ``MOST_NORMAL_FORCE``.
 
     Found by bisection, to a hundredth of itself; None if no friction up to ``MOST_FRICTION`` would do.
     """
 
     def enough(friction: float) -> bool:
-        return all(grip.held and grip.hardest <= MOST_GRIP for grip in grips(model, floating, friction))
+        return all(
+            holding.held and holding.hardest <= MOST_NORMAL_FORCE for holding in holdings(model, floating, friction)
+        )
 
     low, high = 0.0, MOST_FRICTION
     if not enough(high):
@@ -157,14 +161,14 @@ def _load(model: Model, design: Result, k: int) -> Load | None:
     made = wrenches @ nnls(wrenches, needed)[0]
     if np.linalg.norm(needed - made) > HELD:
         return None
-    torques, passive, joints = [], [], []
+    torques, structural, joints = [], [], []
     for place, (i, c) in enumerate(chosen):
         jacobian = _jacobian(design, i, k, c) / model.units.length
         in_palm = palm.T @ turn @ forces[3 * place : 3 * place + 3]
         torques.append(jacobian.T @ in_palm)
-        passive.append(passive_projector(jacobian, NULL_SPACE_DAMPING) @ in_palm)
+        structural.append(structural_projector(jacobian, NULL_SPACE_DAMPING) @ in_palm)
         joints += [(i, j) for j in range(jacobian.shape[1])]
-    borne = np.vstack(passive)
+    borne = np.vstack(structural)
     allowed = max(least_largest(borne, wrenches, made) + _SPARE, design.task.limits.unsupplied_force)
     rows = np.vstack(torques)
     edges = least_largest_solution(rows, wrenches, made, borne, allowed)

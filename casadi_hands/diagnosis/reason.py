@@ -31,7 +31,7 @@ class Reason:
         return f"{self.what}; try {self.advice}"
 
 
-def tell(causes: Iterable[Reason], missed: Iterable[tuple[str, Reason]] = (), most: int = MOST) -> str:
+def format_reasons(causes: Iterable[Reason], missed: Iterable[tuple[str, Reason]] = (), most: int = MOST) -> str:
     """Put reasons into one text: causes first, then what is missed that none of the causes explains.
 
     Args:

@@ -30,7 +30,7 @@ def refined_reason(model: Model, refined: Refined) -> list[Reason]:
     if refined.exact:
         return []
     if refined.met:
-        what = f"fingers can roll with the object over {refined.share:.0%} of the way to its goals, and no farther"
+        what = f"fingers can roll with the object over {refined.homotopy:.0%} of the way to its goals, and no farther"
         advice = f"{_JOINTS}, thicker links (hand.link_radius) or a smaller turn of the object"
         return [Reason(what, advice, frozenset(("goal_position", "goal_angle")))]
     joints = {

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 _TIME_STEP = 0.001  # s
 _PATCH = 0.3  # radius of a fingertip's contact patch, of the link's radius
-_SOFTNESS = 0.02  # depth over which a contact stiffens, of the object's half extent
+_SOFTNESS = 0.02  # depth over which a contact stiffens, of the characteristic length
 _STILL = 1e-9  # a palm that moves less, relative to its size (or in its quaternion), stands still
 
 
@@ -71,9 +71,9 @@ def scene_mjcf(task: Task, hand: Hand, motion: Motion) -> str:
     root = Element("mujoco", model=task.name)
     _add_settings(root, task)
     world = SubElement(root, "worldbody")
-    SubElement(world, "light", pos=numbers(motion.object_position[0] + [0, 0, 20 * task.object.half_extent]))
+    SubElement(world, "light", pos=numbers(motion.object_position[0] + [0, 0, 20 * task.object.characteristic_length]))
     if task.ground is not None:
-        _add_ground(world, task.ground, task.object.half_extent)
+        _add_ground(world, task.ground, task.object.characteristic_length)
     _add_hand(world, task, hand, motion, motors, moves)
     _add_object(world, task, hand, motion)
     contact = SubElement(root, "contact")
@@ -117,10 +117,14 @@ def _add_settings(root: Element, task: Task) -> None:
         impratio="10",
         noslip_iterations="5",
     )
-    extent = 8 * task.object.half_extent
+    extent = 8 * task.object.characteristic_length
     center = task.palm.position
     SubElement(root, "statistic", extent=number(extent), center=numbers(center), meansize=number(extent / 20))
-    geom = {"condim": "4", "solref": "0.01 1", "solimp": f"0.9 0.95 {number(_SOFTNESS * task.object.half_extent)}"}
+    geom = {
+        "condim": "4",
+        "solref": "0.01 1",
+        "solimp": f"0.9 0.95 {number(_SOFTNESS * task.object.characteristic_length)}",
+    }
     SubElement(SubElement(root, "default"), "geom", geom)
 
 

@@ -19,7 +19,7 @@ def contact_kinematics(finger: FingerSeed, strings: NDArray[np.int64], link_radi
     Args:
         finger: its ``tips`` hold one contact a string.
         strings: (N,) the string of each keyframe.
-        link_radius: half extents.
+        link_radius: lengths.
     """
     # The same code serves CasADi's numbers; only its annotations speak of symbols.
     length, radius = ca.DM(finger.lengths[-1]), ca.DM(link_radius)

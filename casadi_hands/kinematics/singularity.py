@@ -1,9 +1,9 @@
-"""The branch of its kinematics that a finger is on while it touches, and stays on.
+"""The singularity margin of a finger: how far it is from poses where its Jacobian loses rank, and on which side.
 
 Where a finger is stretched out or folded, its Jacobian is singular: some forces are out of its reach, and only few ways
 lead through such a pose. A motion on few knots steps over it unnoticed, and on denser ones no exact motion is near.
 Fingers of two or three joints can be kept from it: while one stays on its side of all singular poses, what
-``regularity`` gives does not vanish.
+``singularity_margin`` gives does not vanish.
 """
 
 from __future__ import annotations
@@ -16,29 +16,30 @@ from casadi import SX
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-SIZES = {2: 3, 3: 1}  # of the regularity, by number of joints; with others a finger has no branches, or may change them
-REGULAR = 0.25  # least regularity, of its median over a touch
-MOSTLY = 0.8  # of a touch that a finger has to be on one branch, to be kept on it all the while
-# Regularity over that of levers as long that are at right angles to each other:
+# Components of the margin, by number of joints; other fingers have none, or may change sides.
+MARGIN_SIZES = {2: 3, 3: 1}
+LEAST_MARGIN = 0.25  # of the margin's median over a touch
+MOSTLY = 0.8  # of a touch that a finger has to be on one side, to be kept there all the while
+# The margin over that of columns as long that are at right angles to each other:
 NEAR = 0.02  # below it a pose is nearly singular
-_SINGULAR = 1e-3  # a finger that is usually below it is on no branch
+_SINGULAR = 1e-3  # a finger that is usually below it is on no side
 
 
-def regularity(jacobian: SX) -> SX:
+def singularity_margin(jacobian: SX) -> SX:
     """What vanishes where a Jacobian (3, n) is singular: its determinant (1,), or the product of its columns (3,)."""
     return ca.det(jacobian) if jacobian.shape[1] == 3 else ca.cross(jacobian[:, 0], jacobian[:, 1])
 
 
-def folds(jacobians: Array, active: NDArray[np.bool_]) -> bool:
+def passes_singularity(jacobians: Array, active: NDArray[np.bool_]) -> bool:
     """Whether a finger passes a singular pose while its contact touches, or comes very near to one.
 
     Args:
         jacobians: (N, 3, n) of its contact at the keyframes.
         active: (N,) when it touches.
     """
-    if jacobians.shape[2] not in SIZES:
+    if jacobians.shape[2] not in MARGIN_SIZES:
         return False
-    measured, most = _regularities(jacobians), _most(jacobians)
+    measured, most = _margins(jacobians), _most(jacobians)
     for at in _touches(active, active):
         near = np.linalg.norm(measured[at], axis=1) < NEAR * most[at]
         if near.any() or _turns(measured[at]).any():
@@ -46,18 +47,18 @@ def folds(jacobians: Array, active: NDArray[np.bool_]) -> bool:
     return False
 
 
-def branches(jacobians: Array, active: NDArray[np.bool_], touching: NDArray[np.bool_]) -> Array:
-    """What the regularity at each knot is to be multiplied with; at least ``REGULAR`` is asked of the result.
+def margin_directions(jacobians: Array, active: NDArray[np.bool_], touching: NDArray[np.bool_]) -> Array:
+    """What the singularity margin at each knot is to be multiplied with; ``LEAST_MARGIN`` is asked of the result.
 
     Args:
-        jacobians: (S, 3, n) of the contact of a finger of two or three joints, of a motion that tells the branches.
+        jacobians: (S, 3, n) of the contact of a finger of two or three joints, of a motion that tells the sides.
         active: (S,) when its contact touches, held from its knot to the next.
         touching: (S,) the same with the knot at which each touch ends.
 
     Returns:
-        (S, size), one over the median where the motion is on its branch, zeros where none is to be kept.
+        (S, size), one over the median where the motion is on its side, zeros where none is to be kept.
     """
-    measured, most = _regularities(jacobians), _most(jacobians)
+    measured, most = _margins(jacobians), _most(jacobians)
     result = np.zeros_like(measured)
     for at in _touches(active, touching):
         if np.median(np.linalg.norm(measured[at], axis=1)) > _SINGULAR * np.median(most[at]):
@@ -66,7 +67,7 @@ def branches(jacobians: Array, active: NDArray[np.bool_], touching: NDArray[np.b
 
 
 def _kept(measured: Array) -> Array:
-    """The branch (K, size) of one touch, of its regularities."""
+    """The direction (K, size) of one touch, of its margins."""
     sides = np.where(np.append(0, np.cumsum(_turns(measured))) % 2, -1.0, 1.0)
     mean = sides.mean()
     sizes = np.linalg.norm(measured, axis=1)
@@ -84,17 +85,17 @@ def _touches(active: NDArray[np.bool_], touching: NDArray[np.bool_]) -> Iterator
 
 
 def _turns(measured: Array) -> NDArray[np.bool_]:
-    """Between which of some regularities (K, size) a singular pose is passed."""
+    """Between which of some margins (K, size) a singular pose is passed."""
     return np.asarray(np.einsum("ks,ks->k", measured[1:], measured[:-1]) < 0)
 
 
 def _most(jacobians: Array) -> Array:
-    """(S,) size of the regularity if joints' levers were at right angles to each other."""
+    """(S,) size of the margin if the Jacobian's columns were at right angles to each other."""
     return np.asarray(np.prod(np.linalg.norm(jacobians, axis=1), axis=1))
 
 
-def _regularities(jacobians: Array) -> Array:
-    """``regularity`` (S, size) of Jacobians (S, 3, n)."""
+def _margins(jacobians: Array) -> Array:
+    """``singularity_margin`` (S, size) of Jacobians (S, 3, n)."""
     if jacobians.shape[2] == 3:
         return np.asarray(np.linalg.det(jacobians))[:, None]
     return np.asarray(np.cross(jacobians[:, :, 0], jacobians[:, :, 1]))

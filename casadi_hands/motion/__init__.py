@@ -12,7 +12,7 @@ from casadi_hands.motion.rotation import (
     rotation_matrix,
 )
 from casadi_hands.motion.schedule import Schedule
-from casadi_hands.motion.spline import catmull_rom, eased, held, linear
+from casadi_hands.motion.spline import catmull_rom, linear, time_scaled, zero_order_hold
 
 __all__ = [
     "Schedule",
@@ -22,11 +22,11 @@ __all__ = [
     "conjugate",
     "continuous",
     "derivative",
-    "eased",
     "exponential",
-    "held",
     "linear",
     "multiply",
     "nearest_exponential",
     "rotation_matrix",
+    "time_scaled",
+    "zero_order_hold",
 ]

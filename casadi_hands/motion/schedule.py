@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from casadi_hands.motion.spline import catmull_rom, held
+from casadi_hands.motion.spline import catmull_rom, zero_order_hold
 
 Weights = NDArray[np.float64]
 
@@ -73,7 +73,7 @@ class Schedule:
     @property
     def sample_keyframes(self) -> NDArray[np.int64]:
         """Index (S,) of the keyframe whose contact flags hold at each sample."""
-        return held(self.keyframes, self.samples)
+        return zero_order_hold(self.keyframes, self.samples)
 
     def at(self, offset: float = 0.0) -> NDArray[np.float64]:
         """Times (S,) ``offset`` steps after the samples, mirrored at the ends as splines are, s."""

@@ -26,7 +26,7 @@ def linear(knots: ArrayLike, times: ArrayLike) -> Weights:
     return weights
 
 
-def held(knots: ArrayLike, times: ArrayLike) -> NDArray[np.int64]:
+def zero_order_hold(knots: ArrayLike, times: ArrayLike) -> NDArray[np.int64]:
     """Index (T,) of the knot whose value holds at each time: the last one not later than it."""
     knots = np.asarray(knots, float)
     return np.clip(np.searchsorted(knots, np.asarray(times, float) + 1e-9, side="right") - 1, 0, len(knots) - 1)
@@ -56,7 +56,7 @@ def catmull_rom(knots: ArrayLike, times: ArrayLike, resting: ArrayLike = ()) -> 
     return weights
 
 
-def eased(knots: ArrayLike, times: ArrayLike) -> Weights:
+def time_scaled(knots: ArrayLike, times: ArrayLike) -> Weights:
     """Times (T,) moved within their intervals so that what is linear in them rests at every knot.
 
     Each interval is passed at 6s⁵ - 15s⁴ + 10s³: speed and acceleration vanish at its ends.

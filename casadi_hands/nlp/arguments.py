@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 from casadi_hands.nlp.kernel import Kernel, Local
 from casadi_hands.nlp.layout import Label, Parameter, Rows
@@ -84,6 +85,6 @@ def _check_order(kernel: Kernel, given: Mapping[str, Argument]) -> None:
             marks.setdefault(local.quantity, []).append((local.place, when, local.name))
     for marked in marks.values():
         ordered = sorted(marked)
-        for (_, before, first), (_, after, second) in zip(ordered, ordered[1:], strict=False):
+        for (_, before, first), (_, after, second) in pairwise(ordered):
             if after <= before:
                 raise ValueError(f"{kernel.name}.{second}: is not later than {first}")

@@ -67,8 +67,9 @@ class Program:
     def functions(self) -> dict[str, Function]:
         """As ``Problem.functions`` gives them, without machine code; they give the same numbers, more slowly.
 
-        ``nlp`` (x, p) -> (f, g); ``grad_f`` (x, p) -> (f, grad_f_x); ``jac_g`` (x, p) -> (g, jac_g_x); ``hess_lag``
-        (x, p, lam_f, lam_g) -> the upper triangle of the Hessian of lam_f·f + lam_gᵀg; ``terms`` (x, p) -> (f, g, terms).
+        ``nlp`` (x, p) -> (f, g); ``grad_f`` (x, p) -> (f, grad_f_x); ``jac_g`` (x, p) -> (g, jac_g_x); ``terms``
+        (x, p) -> (f, g, terms); ``hess_lag`` (x, p, lam_f, lam_g) -> the upper triangle of the Hessian of
+        lam_f·f + lam_gᵀg.
         """
         return self.problem.functions(portable=True)
 

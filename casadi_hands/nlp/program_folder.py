@@ -17,7 +17,7 @@ from casadi_hands.nlp.program_page import program_page
 def save_program(program: Program, folder: Path, title: str, facts: Mapping[str, Any], quantities: Quantities) -> None:
     """Write a program.
 
-    Functions go into ``<name>.casadi`` as CasADi serialises them, arrays into ``program.npz``, the index by name, with
+    Functions go into ``<name>.casadi`` as CasADi saves them, arrays into ``program.npz``, the index by name, with
     ``title`` and ``facts``, into ``program.json``, which comes last, and the page into ``index.html``.
 
     Args:
@@ -33,10 +33,9 @@ def save_program(program: Program, folder: Path, title: str, facts: Mapping[str,
     folder.mkdir(parents=True, exist_ok=True)
     record = folder / "program.json"
     record.unlink(missing_ok=True)
-    for name, function in program.functions.items():
-        # CasADi's own writing does not notice a full disk.
-        (folder / f"{name}.casadi").write_text(function.serialize(), encoding="ascii")
     np.savez_compressed(folder / "program.npz", **program.numbers)  # type: ignore[arg-type]
+    for name, function in program.functions.items():
+        function.save(str(folder / f"{name}.casadi"))
     index = program_index(program, quantities)
     (folder / "index.html").write_text(program_page(program, index, title, facts), encoding="utf-8")
     record.write_text(_readable({"title": title, **facts, **index}), encoding="utf-8")

@@ -87,7 +87,9 @@ def _array(name: str, positions: NDArray[np.int64], quantities: Quantities) -> d
 
 def _terms(program: Program) -> dict[str, dict[str, Any]]:
     problem, found = program.problem, {}
-    for name, term in problem.declared_terms.items():
+    declared = problem.declared_terms
+    for name in problem.terms:
+        term = declared[name]
         found[name] = {
             "about": term.about,
             "equation": term.equation,
@@ -145,7 +147,8 @@ def _constraints(program: Program) -> dict[str, dict[str, Any]]:
 def _largest(matrix: Any, axis: int) -> Array:
     """Size of the largest entry of each row (axis 0) or column (axis 1); 0 of an empty one."""
     largest = np.zeros(matrix.shape[axis])
-    np.maximum.at(largest, matrix.coords[axis], np.abs(matrix.data))
+    with np.errstate(invalid="ignore"):
+        np.maximum.at(largest, matrix.coords[axis], np.abs(matrix.data))
     return largest
 
 

@@ -24,7 +24,7 @@ from casadi_hands.stages.synthesis.algorithm import Candidate, Found, Search
 
 Array = NDArray[np.float64]
 LONG_DROPS = 6  # of the replays: where more drop the object, all hands of a structure are tried
-OUT_OF_REACH = 0.3  # half extents that a finger misses its contact by: nothing is left to refine
+OUT_OF_REACH = 0.3  # lengths that a finger misses its contact by: nothing is left to refine
 SURELY = np.pi / 2  # that an object may turn so that contacts can surely go with it
 HANDS_REFINED = 2  # hands of one structure that are tried, and more only where nothing else is left to try
 
@@ -60,7 +60,7 @@ class Certifier:
         short = tuple(shortcoming_reason(self.model, each) for each in found.short)
         if found.farthest > OUT_OF_REACH:
             run_whole_hand(self.record, self.model, self.floating, found.candidates[0])
-            return self.record.offer(self.judge.judge(self.record.design, short))
+            return self.record.update_best(self.judge.judge(self.record.design, short))
         while True:
             failing: set[str] = set()
             fewest = np.inf  # drops of a hand whose files hold
@@ -69,10 +69,10 @@ class Certifier:
                 if k >= HANDS_REFINED and (fewest <= LONG_DROPS or may_grow):
                     break
                 judged, refined = self._certify(candidate, short)
-                best = self.record.offer(judged)
+                best = self.record.update_best(judged)
                 if judged.status == "certified":
                     return best
-                self.record.say("refine", f"not certified: {judged.reason}")
+                self.record.log("refine", f"not certified: {judged.reason}")
                 if judged.drops is not None:
                     fewest = min(fewest, judged.drops)
                 failing |= failing_fingers(self.model, refined)
@@ -81,23 +81,19 @@ class Certifier:
             least = self._more_joints(found, failing)
             if fewest < np.inf or least is None:
                 return best
-            self.record.say("synthesis", f"another joint for {', '.join(sorted(failing)) or 'the fingers with fewest'}")
+            self.record.log("synthesis", f"another joint for {', '.join(sorted(failing)) or 'the fingers with fewest'}")
             found = run_search(self.record, self.model, self.search, least)
 
     def _certify(self, candidate: Candidate, short: tuple[Reason, ...]) -> tuple[Design, Refined]:
         """Find a hand's motion and refine it; where contacts cannot go with the object, from a shorter one on."""
-        model, floating, share = self._begun
+        model, floating, homotopy = self._begun
         whole = run_whole_hand(self.record, model, floating, candidate)
-        return self.refiner.certify(whole, short, share=share)
+        return self.refiner.certify(whole, short, homotopy=homotopy)
 
     @cached_property
     def _begun(self) -> tuple[Model, Floating, float]:
-        """What refinements begin with: the task, or a share of its way that fingers can surely go with the object."""
-        share = _within_reach(self.model) if self.model.held_back else 1.0
-        if share == 1:
-            return self.model, self.floating, share
-        model = shortened(self.model, share)
-        return model, run_shortened(self.record, model, self.floating), share
+        """What refinements begin with."""
+        return refinable(self.record, self.model, self.floating)
 
     def _more_joints(self, found: Found, failing: set[str]) -> dict[int, int] | None:
         """Joints of each finger for the next round; None when no failing finger may have more."""
@@ -111,8 +107,17 @@ class Certifier:
         return {c: n + (c in chosen and n == fewest) for c, n in joints.items()}
 
 
+def refinable(record: Record, model: Model, floating: Floating) -> tuple[Model, Floating, float]:
+    """What refinements begin with: the task, or a share of its way that fingers can surely go with the object."""
+    homotopy = _within_reach(model) if model.limits_travel else 1.0
+    if homotopy == 1:
+        return model, floating, homotopy
+    shorter = shortened(model, homotopy)
+    return shorter, run_shortened(record, shorter, floating), homotopy
+
+
 def _within_reach(model: Model) -> float:
-    """The share of the way to its goals over which an object turns by less than fingers can go with it."""
+    """The homotopy parameter up to which an object turns by less than fingers can go with it."""
     seen = goals_seen_from_palm(model)
     turns = np.linalg.norm(seen[:, 3:] - seen[0, 3:], axis=1)
     return float(min(1.0, SURELY / max(turns.max(), 1e-9)))

@@ -9,7 +9,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from casadi_hands.motion import held, linear, nearest_exponential
+from casadi_hands.motion import linear, nearest_exponential, zero_order_hold
 from casadi_hands.motion.quaternion import quaternion
 from casadi_hands.nlp import Solution
 from casadi_hands.problem.hand import Hand
@@ -29,7 +29,7 @@ def earlier_motion(hand: Hand, motion: Motion, old: Model, model: Model) -> Whol
     between = linear(motion.time, when)
     turns = np.array([matrix(q) for q in motion.object_orientation])
     forces = np.einsum("sji,scj->sci", turns, in_columns(motion, model, motion.contact_force))
-    active = in_columns(motion, model, motion.contact_active)[held(motion.time, when)]
+    active = in_columns(motion, model, motion.contact_active)[zero_order_hold(motion.time, when)]
     contacts = [model.contact_names.index(finger.name) for finger in hand.fingers]
     joints, at = resting_spline(motion.time, motion.joint_angles)(when), model.schedule.keyframe_samples
     fingers, angles = [], []

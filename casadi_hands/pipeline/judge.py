@@ -17,7 +17,7 @@ from casadi_hands.diagnosis.figures import (
     speed_reason,
     torque_reason,
 )
-from casadi_hands.diagnosis.reason import Reason, tell
+from casadi_hands.diagnosis.reason import Reason, format_reasons
 from casadi_hands.export.design import Design
 from casadi_hands.export.folder import save_design
 from casadi_hands.problem.floating_motion import Floating
@@ -27,7 +27,7 @@ from casadi_hands.problem.motion import Motion
 from casadi_hands.verify import audit_files, run_replays
 from casadi_hands.verify.report import Audit
 
-# Beyond these, where they are also beyond the limits, a motion is none: lengths in half extents, degrees, m·g.
+# Beyond these, where they are also beyond the limits, a motion is none: lengths in lengths, degrees, m·g.
 FEASIBLE = {
     "goal_position": 0.02,
     "goal_angle": 1.0,
@@ -72,7 +72,7 @@ class Judge:
             return replace(design, status="certified", reason="", certificate=certificate)
         planned = planned or design
         first = [self._friction, torque_reason(self.model, planned), speed_reason(self.model, planned)]
-        reason = tell([*filter(None, first), *causes], missed_figures(design, verdict))
+        reason = format_reasons([*filter(None, first), *causes], missed_figures(design, verdict))
         possible = all(self._feasible(name, certificate[name]) for name in FEASIBLE if name in certificate)
         return replace(design, status="feasible" if possible else "failed", reason=reason, certificate=certificate)
 
@@ -93,7 +93,7 @@ class Judge:
             return judged
         lost = tried.dropped_before()
         causes = [] if lost is None else [Reason(f"{lost}, with nothing perturbed", GRASP_ADVICE, frozenset(figures))]
-        return replace(judged, status="feasible", reason=tell(causes, missed_figures(design, seen)))
+        return replace(judged, status="feasible", reason=format_reasons(causes, missed_figures(design, seen)))
 
     def concluded(self, design: Design, jobs: int = 1) -> Design:
         """The design as it is handed over: replayed, and where motors keep it from its goals, told which would do."""

@@ -65,14 +65,14 @@ class Record:
         self._best: tuple[tuple[float, ...], Design] | None = None
         self._unmet: dict[str, tuple[Reason, ...]] = {}
 
-    def say(self, stage: str, text: str) -> None:
+    def log(self, stage: str, text: str) -> None:
         """Report progress."""
         self.report(Progress(stage, text, time.perf_counter() - self.started))
 
     @contextmanager
     def stage(self, name: str, text: str) -> Iterator[None]:
         """Announce a stage and add its time to the design's."""
-        self.say(name, text)
+        self.log(name, text)
         began = time.perf_counter()
         yield
         seconds = dict(self.design.seconds)
@@ -113,7 +113,7 @@ class Record:
         seconds = {**self.design.seconds, "total": time.perf_counter() - self.started}
         return replace(design, stages=self.design.stages, seconds=seconds)
 
-    def offer(self, design: Design) -> Design:
+    def update_best(self, design: Design) -> Design:
         """Take a judged design for the best if it misses less than the best so far, and write it.
 
         Args:

@@ -28,7 +28,7 @@ from casadi_hands.verify.report import Audit
 Array = NDArray[np.float64]
 AMPLE = Margin()
 SMALL = Margin(friction=0.8, normal_force=0.25)
-FIRM = Margin(normal_force=4.0)  # an error of a sensor or of friction shifts a smaller share of it
+LARGE = Margin(normal_force=4.0)  # an error of a sensor or of friction shifts a smaller share of it
 # What an exact motion misses only by how it goes between its samples; then it gets more of them.
 BETWEEN = {"residual", "residual_between", "gap_between", "slip", "penetration", "joint_limit"}
 FINEST = 0.02  # s between samples
@@ -56,41 +56,42 @@ class Refiner:
         short: tuple[Reason, ...],
         margin: Margin = AMPLE,
         near: bool = False,
-        share: float = 1.0,
+        homotopy: float = 1.0,
     ) -> tuple[Design, Refined]:
         """Refine one hand with a margin, and with others where that fails.
 
-        A small one where no motion is exact, another grip where the audit refuses one that is, a firm one where a
-        replay drops.
+        A small one where no motion is exact, another lower bound on normal forces where the audit refuses one that is,
+        and a larger one where a replay drops.
 
         Args:
             whole: the hand and its motion.
             short: what its fingers could not do before.
             margin: the first to be tried.
             near: whether the motion is nearly exact already.
-            share: of the way to its goals that the motion goes.
+            homotopy: the homotopy parameter that its motion goes to: 1 at its goals.
 
         Returns:
             the design, replayed where its files hold, and its refinement.
         """
         planned = self.record.design
         stage = Continuation(self.model, whole.contacts, tuple(f.joints for f in whole.fingers), whole.active)
-        refined = self._refined(stage, whole, margin, near, share)
+        refined = self._refined(stage, whole, margin, near, homotopy)
         judged, refined, stage = self._between(whole, refined, stage, short, planned)
         if refined.exact and judged.status != "certified" and not stage.passes_through(refined):
             # Where joints barely push, fingers may fold over in an instant: other forces take them another way.
-            other, grip = (AMPLE, "looser") if refined.margin == FIRM else (FIRM, "firmer")
-            regripped = self._regripped(whole, refined, stage, other, f"again with a {grip} grip: {judged.reason}")
-            design, regripped, halved = self._between(whole, regripped, stage, short, planned)
+            margin, which = (AMPLE, "smaller") if refined.margin == LARGE else (LARGE, "larger")
+            text = f"again with a {which} lower bound on normal forces: {judged.reason}"
+            other = self._with_margin(whole, refined, stage, margin, text)
+            design, other, halved = self._between(whole, other, stage, short, planned)
             if design.status == "certified":
-                judged, refined, stage = design, regripped, halved
+                judged, refined, stage = design, other, halved
         judged = self._replayed(judged)
-        if judged.drops and refined.margin != FIRM:
-            text = f"again with a firmer grip: {judged.drops} of {REPLAYS} replays dropped the object"
-            firmer = self._regripped(whole, refined, stage, FIRM, text)
-            design = self._replayed(self._judged(stage.model, firmer, short, planned))
+        if judged.drops and refined.margin != LARGE:
+            text = f"again with a larger lower bound on normal forces: {judged.drops} of {REPLAYS} replays dropped the object"
+            larger = self._with_margin(whole, refined, stage, LARGE, text)
+            design = self._replayed(self._judged(stage.model, larger, short, planned))
             if rank_of(design) < rank_of(judged):
-                return design, firmer
+                return design, larger
         return judged, refined
 
     def _between(
@@ -116,35 +117,37 @@ class Refiner:
             judged, refined, stage = design, closer, halved
         return judged, refined, stage
 
-    def _regripped(self, whole: WholeHand, refined: Refined, stage: Continuation, margin: Margin, why: str) -> Refined:
+    def _with_margin(
+        self, whole: WholeHand, refined: Refined, stage: Continuation, margin: Margin, why: str
+    ) -> Refined:
         """An exact motion refined with another margin."""
         with self.record.stage("refine", why):
-            return self._attempt(whole, margin, partial(stage.regrip, refined))
+            return self._attempt(whole, margin, partial(stage.with_margin, refined))
 
-    def _refined(self, stage: Continuation, whole: WholeHand, margin: Margin, near: bool, share: float) -> Refined:
+    def _refined(self, stage: Continuation, whole: WholeHand, margin: Margin, near: bool, homotopy: float) -> Refined:
         """The refinement with this margin or, where that is not exact and another may be, with a small one.
 
-        Over a long way errors add up, and a firm grip is needed nearly always: it is kept at once where it can be.
+        Over long motions errors add up, and large normal forces are needed nearly always: they are asked for at once.
         """
         again: Callable[..., Refined] = partial(stage.solve, whole)
         first = partial(again, near=near)
-        if share < 1:
-            again = partial(stage.lengthen, whole, share)
-            first = partial(again, firmer=FIRM)
+        if homotopy < 1:
+            again = partial(stage.continue_from, whole, homotopy)
+            first = partial(again, larger=LARGE)
         with self.record.stage("refine", "the same motion with exact physics, rolling contacts and clearance"):
             refined = self._attempt(whole, margin, first)
         if refined.exact or refined.barely_rolls or margin == SMALL:
             return refined
-        with self.record.stage("refine", "again, closer to the limits of friction and grip"):
+        with self.record.stage("refine", "again, closer to the limits of friction and normal forces"):
             second = self._attempt(whole, SMALL, again)
         return second if second.misses_less_than(refined) else refined
 
-    def _attempt(self, whole: WholeHand, margin: Margin, way: Callable[..., Refined]) -> Refined:
-        """Refine with one margin, and record all solves, whether they serve or not."""
-        result = way(margin=margin)
+    def _attempt(self, whole: WholeHand, margin: Margin, refine: Callable[..., Refined]) -> Refined:
+        """Refine with one margin, and record all solves, acceptable or not."""
+        result = refine(margin=margin)
         runs = []
         for step, solution, kept in result.runs:
-            what = f"hand, {kept.friction:g} of the friction and {kept.normal_force:g} weights of grip"
+            what = f"hand, {kept.friction:g} of the friction and {kept.normal_force:g} weights of normal force"
             runs.append(run_record("refine", what, self.record.task.search.seed, step, solution))
             if solution is result.hand.solution:
                 runs[-1]["design_change"] = design_change(self.model, whole, result.hand)
@@ -166,7 +169,7 @@ class Refiner:
         self.record.set_unmet("refine", own_reasons(model, refined))
         judged = self.judge.judge(self.record.design, causes, None if refined.exact else planned)
         design = self.record.held_to_bounds(judged)
-        self.record.offer(design)
+        self.record.update_best(design)
         return design
 
     def _replayed(self, design: Design) -> Design:
@@ -175,7 +178,7 @@ class Refiner:
             return design
         with self.record.stage("refine", "replays of the motion that holds"):
             design = self.judge.replayed(design, self.jobs)
-        self.record.offer(design)
+        self.record.update_best(design)
         return design
 
 

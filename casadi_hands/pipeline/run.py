@@ -95,10 +95,10 @@ def _refine_again(record: Record, start: Path) -> Design | None:
     # Replays of one hand take about as long as other processes take to start.
     design, _ = Refiner(record, model, judge, jobs=1).certify(whole, (), margin, near=True)
     record.update(stages=[{**run, "started_from": str(start)} for run in record.design.stages])
-    record.offer(design)
+    record.update_best(design)
     if design.status == "certified":
         return design
-    record.say("refine", f"from the earlier result no hand is certified: {design.reason}; now all stages")
+    record.log("refine", f"from the earlier result no hand is certified: {design.reason}; now all stages")
     record.update(hand=None, motion=None, costs={})
     return None
 

@@ -61,7 +61,7 @@ def prepare_search(record: Record, model: Model, floating: Floating, executor: E
         threshold=settings.threshold,
         seed=settings.seed,
         executor=executor,
-        progress=lambda text: record.say("synthesis", text),
+        progress=lambda text: record.log("synthesis", text),
     )
 
 
@@ -74,7 +74,7 @@ def run_search(record: Record, model: Model, search: Search, least: Mapping[int,
     record.set_costs("synthesis", best.hand.solution, dict(record.task.weights.synthesis))
     record.update(hand=hand_of(record.task, model, best.hand.fingers, best.hand.contacts, 1.0, 1.0), motion=None)
     joints = "+".join(map(str, best.joints))
-    record.say("synthesis", f"best hand has {joints} joints, scores {', '.join(f'{s:.3f}' for s in best.scores)}")
+    record.log("synthesis", f"best hand has {joints} joints, scores {', '.join(f'{s:.3f}' for s in best.scores)}")
     return found
 
 

@@ -14,7 +14,7 @@ from casadi_hands.export.design import Design
 from casadi_hands.geometry.contact_points import inward_normals, on_bodies
 from casadi_hands.kinematics import STAND, finger_kinematics
 from casadi_hands.kinematics.morphology import FingerSeed
-from casadi_hands.motion import eased, linear
+from casadi_hands.motion import linear, time_scaled
 from casadi_hands.motion.quaternion import quaternion
 from casadi_hands.pipeline.earlier_motion import (
     NOT_SOLVED,
@@ -25,20 +25,20 @@ from casadi_hands.pipeline.earlier_motion import (
     stretched,
     turns_at,
 )
-from casadi_hands.pipeline.refiner import AMPLE, FIRM, SMALL
+from casadi_hands.pipeline.refiner import AMPLE, LARGE, SMALL
 from casadi_hands.problem.floating_motion import Floating
 from casadi_hands.problem.hand import Hand
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.placement import in_palm
 from casadi_hands.problem.si import build_model
-from casadi_hands.stages.refine.values import Margin, eased_in
+from casadi_hands.stages.refine.values import Margin, force_ramp
 from casadi_hands.task import Task
 
 Array = NDArray[np.float64]
 _NEARLY = 0.98  # margins are kept on surfaces whose kinks are rounded
 _STEPS = 4  # of Gauss and Newton
-_STIFF = 0.05  # half extents/rad, what keeps joints near their angles where that gains little
+_STIFF = 0.05  # lengths/rad, what keeps joints near their angles where that gains little
 
 
 def warm_start(earlier: Design, task: Task, model: Model) -> WholeHand:
@@ -85,14 +85,14 @@ def kept_margin(earlier: Design) -> Margin:
     for c in whole.contacts:
         active = whole.active[:, c]
         bearing = active & np.append(active[:1], active[:-1])
-        asked = eased_in(bearing, model.schedule.samples)
+        asked = force_ramp(bearing, model.schedule.samples)
         points, force = whole.point[bearing, c], whole.force[bearing, c]
         inward = inward_normals(points, [model.touched[c]] * len(points))
         normal = (force * inward).sum(axis=1)
         across = np.linalg.norm(force - normal[:, None] * inward, axis=1)
         grip = min(grip, float((normal / asked[bearing]).min()))
         use = max(use, float((across / (model.friction * normal)).max()))
-    kept = (m for m in (FIRM, AMPLE) if grip >= _NEARLY * m.normal_force and _NEARLY * use <= m.friction)
+    kept = (m for m in (LARGE, AMPLE) if grip >= _NEARLY * m.normal_force and _NEARLY * use <= m.friction)
     return next(kept, SMALL)
 
 
@@ -133,7 +133,7 @@ def _moved(was: WholeHand, task: Task, old: Model, model: Model) -> WholeHand:
     """The object's path, the palm's and the contacts on the object, moved by what the task moved."""
     scale = old.units.length / model.units.length
     goals = model.schedule.keyframes[list(model.schedule.goals)]
-    blend = linear(goals, eased(goals, model.schedule.samples))
+    blend = linear(goals, time_scaled(goals, model.schedule.samples))
     vector = was.vector + blend @ (model.goal_vectors - old.goal_vectors)
     position = was.position + blend @ (model.goal_positions - scale * old.goal_positions)
     if model.tool is not None and old.tool is not None:

@@ -22,7 +22,7 @@ class Floating:
         point: (N, C, 3) object frame; the ground's contact, if any, last.
         force: (S, C, 3) object frame, at the samples.
         active: (N, C) bool.
-        activity: (N, C) the contact invariants before thresholds.
+        invariant: (N, C) the contact invariants before thresholds.
         threshold: that gave ``active``; 0 where all contacts had to stay.
         solution: the solve this motion is from.
         runs: every solve: (what, solution).
@@ -33,7 +33,7 @@ class Floating:
     point: Array
     force: Array
     active: NDArray[np.bool_]
-    activity: Array
+    invariant: Array
     threshold: float
     solution: Solution
     runs: tuple[tuple[str, Solution], ...]

@@ -9,7 +9,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from casadi_hands.geometry.bodies import Body
-from casadi_hands.motion import Schedule, held
+from casadi_hands.motion import Schedule, zero_order_hold
 from casadi_hands.problem.contacts import Contact
 from casadi_hands.problem.palm_path import PalmPath
 from casadi_hands.problem.scenario import Scenario
@@ -17,7 +17,7 @@ from casadi_hands.problem.units import Units
 from casadi_hands.terms.own import OwnTerm
 
 Array = NDArray[np.float64]
-_NO_GROUND = -1e3  # half extents
+_NO_GROUND = -1e3  # lengths
 
 
 @dataclass(frozen=True)
@@ -51,9 +51,9 @@ class Model:
         palm_path: where they come from.
         goal_positions: (G, 3) world; for a drawing the tool's targets.
         goal_vectors: (G, 3) rotation vectors from the reference orientation, world; zeros for a drawing.
-        goal_tolerance: half extents and rad, what each coordinate may miss a goal by within the task's limits.
-        gap_tolerance: half extents, a part of the task's limit that a contact's surfaces may be apart.
-        slip_tolerance: half extents, a part of the task's limit that a contact may slip from touch to lift.
+        goal_tolerance: lengths and rad, what each coordinate may miss a goal by within the task's limits.
+        gap_tolerance: lengths, a part of the task's limit that a contact's surfaces may be apart.
+        slip_tolerance: lengths, a part of the task's limit that a contact may slip from touch to lift.
         reference: (4,) quaternion of the reference orientation.
         tool: (3,) object frame, or None when goals are poses.
         scenarios: the motion as planned, and if the task disturbs it, the same with what does.
@@ -151,7 +151,7 @@ class Model:
         return self.regrasp is not None and bool(self.regrasp.lifted[:, contact].any())
 
     @property
-    def held_back(self) -> bool:
+    def limits_travel(self) -> bool:
         """Whether contacts are planned to stay behind while the object turns on beneath fingers that cannot let go."""
         return self.regrasp is not None and not self.regrasp.lifted.any()
 
@@ -166,7 +166,7 @@ class Model:
         lifted = self.regrasp.lifted[:, contact]
         ends = np.union1d(np.flatnonzero(lifted), np.flatnonzero(lifted) + 1)
         weights = schedule.spline(offset, ends)
-        now, then = (held(schedule.keyframes, schedule.samples + o * schedule.step) for o in (0.0, offset))
+        now, then = (zero_order_hold(schedule.keyframes, schedule.samples + o * schedule.step) for o in (0.0, offset))
         touched = lifted[then] & ~lifted[now]
         weights[touched] = schedule.spline(0.0, ends)[touched]
         return weights

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from casadi_hands.motion import eased, linear
+from casadi_hands.motion import linear, time_scaled
 from casadi_hands.motion.quaternion import quaternion
 from casadi_hands.problem.units import round_off
 
@@ -33,7 +33,7 @@ class PalmPath:
         """Positions and quaternions [w, x, y, z] (T, 7) at times (T,) in s."""
         if len(self.times) == 1:
             return np.tile(np.append(self.positions[0], quaternion(self.rotations[0])), (len(times), 1))
-        weights = linear(self.times, eased(self.times, times))
+        weights = linear(self.times, time_scaled(self.times, times))
         turns = [pin.Quaternion(rotation) for rotation in self.rotations]
         quaternions = []
         for row in weights:

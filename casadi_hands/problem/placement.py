@@ -41,7 +41,7 @@ def in_palm(model: Model, motion: WholeHand, points: Array) -> Array:
 
 
 def contact_jacobians(model: Model, motion: WholeHand, finger: int) -> Array:
-    """(S, 3, n) of the point of the last link where a finger's contact on the object is, palm frame, half extents/rad.
+    """(S, 3, n) of the point of the last link where a finger's contact on the object is, palm frame, lengths/rad.
 
     Args:
         model: the task.

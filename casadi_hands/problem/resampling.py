@@ -1,4 +1,4 @@
-"""A task and a motion of it at other samples, or over a part of its way: easier problems to begin with."""
+"""A task and a motion of it at other samples, or for a homotopy parameter: easier problems to begin with."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from casadi_hands.geometry.contact_points import on_bodies
-from casadi_hands.motion import Schedule, catmull_rom, continuous, held, linear, nearest_exponential
+from casadi_hands.motion import Schedule, catmull_rom, continuous, linear, nearest_exponential, zero_order_hold
 from casadi_hands.problem.hand_motion import WholeHand, turned
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.palm_motion import carried_by_palm, goals_seen_from_palm, stands
@@ -24,7 +24,7 @@ def resampled_model(model: Model, schedule: Schedule) -> Model:
     A disturbance lasts to the next of its own samples; of those that act before the next knot a knot has the largest.
     """
     was, now = model.schedule.samples, schedule.samples
-    first = held(was, now)
+    first = zero_order_hold(was, now)
     end = np.append(np.searchsorted(was, now[1:] - 1e-9), len(was))
 
     def coarser(scenario: Scenario) -> Scenario:
@@ -75,7 +75,7 @@ def resampled(hand: WholeHand, before: Model, after: Model) -> WholeHand:
         vector=between @ hand.vector,
         point=np.tensordot(between, hand.point, axes=1),
         force=np.tensordot(straight, hand.force, axes=1),
-        active=hand.active[held(was, now)],
+        active=hand.active[zero_order_hold(was, now)],
         disturbed=None,
     )
     if not moves:
@@ -102,13 +102,13 @@ def _matrix(quaternion: Array) -> Array:
     return np.asarray(pin.Quaternion(*quaternion).matrix())
 
 
-def shortened(model: Model, share: float) -> Model:
-    """The task over a share of the way from its first goal to each of the others; no contact is planned to move.
+def shortened(model: Model, homotopy: float) -> Model:
+    """The task for a homotopy parameter: that part of what leads from its first goal to each of the others.
 
-    A palm that moves goes all its way, and a share of what the object moves as seen from it.
+    No contact is planned to move. A palm that moves does so as far as ever; scaled is what the object moves seen from it.
     """
     seen = goals_seen_from_palm(model)
-    goals = carried_by_palm(model, seen[0] + share * (seen - seen[0]), model.schedule.goal_samples)
+    goals = carried_by_palm(model, seen[0] + homotopy * (seen - seen[0]), model.schedule.goal_samples)
     return replace(model, goal_positions=goals[:, :3], goal_vectors=goals[:, 3:], regrasp=None)
 
 

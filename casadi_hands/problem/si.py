@@ -32,7 +32,7 @@ from casadi_hands.task import Task
 
 Array = NDArray[np.float64]
 _WITHIN = 0.9 / math.sqrt(3)  # share of a limit that each of three coordinates may use
-# Half extents. Beyond these a gap is no contact, and slip would need friction on its cone, whatever a task accepts.
+# Lengths. Beyond these a gap is no contact, and slip would need friction on its cone, whatever a task accepts.
 _MOST_GAP, _MOST_SLIP = 2e-4, 2e-3
 
 
@@ -40,7 +40,7 @@ def build_model(task: Task) -> Model:
     """Turn a task into nondimensional numbers."""
     gravity_size = float(np.linalg.norm(task.gravity))
     acceleration = gravity_size if gravity_size > 0 else STANDARD_GRAVITY
-    length = task.object.half_extent
+    length = task.object.characteristic_length
     units = Units(length, task.object.mass * acceleration, acceleration)
     times, places, turns = zip(*task.palm.waypoints, strict=True)
     goal_times = [goal.at for goal in task.motion]
@@ -123,7 +123,7 @@ def _scenarios(task: Task, schedule: Schedule, units: Units) -> tuple[Scenario, 
 
 
 _RESERVE = 1.5  # of torque and speed limits over what the motion uses, where the task names no actuator
-_LEAST = 0.01  # of the object's weight × half extent, and rad/s: no joint is so weak or slow that none could drive it
+_LEAST = 0.01  # of the object's weight × length, and rad/s: no joint is so weak or slow that none could drive it
 
 
 def hand_of(

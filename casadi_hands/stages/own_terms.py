@@ -42,7 +42,7 @@ def try_out(model: Model, most_joints: int) -> None:
     for stage in OWN_STAGES:
         if terms := own_terms(model, stage):
             fingers = {} if stage == "floating" else dict.fromkeys(model.contact_names, most_joints)
-            kernel = own_kernel(terms, contact_names(model), fingers, invariant=stage != "refine")
+            kernel = own_kernel(terms, contact_names(model), fingers, by_invariants=stage != "refine")
             # Refuses symbols that are no instant's.
             given = [kernel.variables, kernel.parameters]
             ca.Function("tried", given, [*kernel.terms.values(), *kernel.constraints.values()])
@@ -70,7 +70,7 @@ def bind_own(
         contacts: names of those whose points and forces are read, in their order.
         angles: of each finger's joints, by the index of its contact.
         rows: ``pose`` (S, 6), ``point`` and ``force`` (S, 3C), and where forces act by them contact invariants
-            ``activity`` (S, C).
+            ``invariant`` (S, C).
 
     Returns:
         The kernel, or None.
@@ -79,7 +79,7 @@ def bind_own(
     if not terms:
         return None
     fingers = {model.contact_names[c]: each.width for c, each in angles.items()}
-    kernel = own_kernel(terms, contacts, fingers, "activity" in rows)
+    kernel = own_kernel(terms, contacts, fingers, "invariant" in rows)
     problem.parameter("time", (rows["pose"].count, 1))
     for name in _UNITS:
         problem.parameter(name, (1, 1))
@@ -116,7 +116,7 @@ def own_missed(solution: Solution, most: float = SOFTLY_MET) -> dict[str, tuple[
 
 
 def own_kernel(
-    terms: Sequence[OwnTerm], contacts: Sequence[str], fingers: Mapping[str, int], invariant: bool
+    terms: Sequence[OwnTerm], contacts: Sequence[str], fingers: Mapping[str, int], by_invariants: bool
 ) -> Kernel:
     """The terms at one sample.
 
@@ -124,7 +124,7 @@ def own_kernel(
         terms: of one stage.
         contacts: their names.
         fingers: joints of each finger, by the name of its contact.
-        invariant: whether forces act by contact invariants.
+        by_invariants: whether forces act by contact invariants.
 
     Raises:
         TypeError: a residual is no expression.
@@ -133,7 +133,7 @@ def own_kernel(
     kernel, count = Kernel(KERNEL), len(contacts)
     pose, reference = kernel.variable("pose", 6), kernel.parameter("reference", 4)
     points, forces = (ca.reshape(kernel.variable(name, 3 * count), 3, count) for name in ("point", "force"))
-    activity = kernel.variable("activity", count) if invariant else SX.ones(count, 1)
+    invariant = kernel.variable("invariant", count) if by_invariants else SX.ones(count, 1)
     angles = {
         name: kernel.variable(f"angles{i}", joints, "angles", i) for i, (name, joints) in enumerate(fingers.items())
     }
@@ -145,7 +145,7 @@ def own_kernel(
         position=length * position,
         rotation=rotation,
         points={name: length * points[:, i] for i, name in enumerate(contacts)},
-        forces={name: force * activity[i] * ca.mtimes(rotation, forces[:, i]) for i, name in enumerate(contacts)},
+        forces={name: force * invariant[i] * ca.mtimes(rotation, forces[:, i]) for i, name in enumerate(contacts)},
         angles=angles,
     )
     for term in terms:

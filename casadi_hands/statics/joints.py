@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-def passive_projector(jacobian: Array, damping: float) -> Array:
+def structural_projector(jacobian: Array, damping: float) -> Array:
     """(3, 3) onto the forces that no joint supplies, damped as eq. 2.23 is here."""
     normal_matrix = jacobian.T @ jacobian + damping**2 * np.eye(jacobian.shape[1])
     return np.eye(3) - jacobian @ np.linalg.solve(normal_matrix, jacobian.T)

@@ -13,7 +13,7 @@ from casadi_hands.task.task import Task
 
 # The exponential map of orientations is singular at 360°; beyond this turn it is too close.
 _LARGEST_TURN = 300.0
-# Depths below this share of the half extent are the rounding of numbers typed by hand.
+# Depths below this share of the characteristic length are the rounding of numbers typed by hand.
 _TYPED = 1e-3
 
 
@@ -85,11 +85,11 @@ def _object_places(task: Task) -> Iterator[Problem]:
         path = ("motion", number, "position" if goal.position is not None else "tool_at")
         given = str(list(goal.position or goal.tool_at or ()))
         depth = depth_in_palm(body, position, vector, palm)
-        if depth > _TYPED * body.half_extent and (number == 0 or fixed):
+        if depth > _TYPED * body.characteristic_length and (number == 0 or fixed):
             allowed = f"a place where the object is clear of the palm; here it is {depth:.3g} m inside"
             yield Problem(path, given, allowed)
         depth = depth_below(body, position, vector, task.ground.height) if task.ground else 0.0
-        if depth > _TYPED * body.half_extent:
+        if depth > _TYPED * body.characteristic_length:
             allowed = f"a place where the object is above the ground; here it is {depth:.3g} m below"
             yield Problem(path, given, allowed)
 
@@ -113,7 +113,7 @@ def _contacts(task: Task) -> Iterator[Problem]:
     for number, name in enumerate(names):
         for other in names[:number]:
             apart = np.linalg.norm(np.subtract(task.fingers[name].touches, task.fingers[other].touches))
-            if apart < _TYPED * task.object.half_extent:
+            if apart < _TYPED * task.object.characteristic_length:
                 allowed = f"a point away from that of {other}, since two fingertips cannot be in one place"
                 yield Problem(("fingers", name, "touches"), str(list(task.fingers[name].touches)), allowed)
 
@@ -127,6 +127,8 @@ def _object_points(task: Task) -> Iterator[Problem]:
         yield Problem(("object", "center_of_mass"), str(list(body.center_of_mass)), allowed)
     if task.tool is not None:
         distance = min(shape.body.signed_distance(np.array(task.tool)) for shape in body.shapes)
-        if distance > body.half_extent:
-            allowed = f"a point within {body.half_extent:.3g} m of the object; this one is {distance:.3g} m from it"
+        if distance > body.characteristic_length:
+            allowed = (
+                f"a point within {body.characteristic_length:.3g} m of the object; this one is {distance:.3g} m from it"
+            )
             yield Problem(("tool",), str(list(task.tool)), allowed)

@@ -7,9 +7,9 @@ from pydantic import Field
 from casadi_hands.task.fields import NonNegative, Section
 
 
-def usual_replay_position(half_extent: float) -> float:
-    """The default of ``replay_position``, m, for an object with this half extent, m."""
-    return max(0.002, 0.05 * half_extent)
+def usual_replay_position(characteristic_length: float) -> float:
+    """The default of ``replay_position``, m, for an object with this characteristic length, m."""
+    return max(0.002, 0.05 * characteristic_length)
 
 
 class Limits(Section):
@@ -19,7 +19,7 @@ class Limits(Section):
     goal_angle: NonNegative = Field(default=0.5, description="Angle between object and goal, degrees.")
     residual: NonNegative = Field(
         default=1e-6,
-        description="Newton-Euler residual at the motion's knots: force over weight, torque over weight × half extent.",
+        description="Newton-Euler residual at the motion's knots: force over weight, torque over weight × length.",
     )
     residual_between: NonNegative = Field(default=1e-3, description="The same between knots.")
     friction_excess: NonNegative = Field(
@@ -46,7 +46,7 @@ class Limits(Section):
     replay_position: NonNegative = Field(
         default=0.002,
         description="Distance of object (or tool) and any goal when the design is replayed as planned, m.",
-        json_schema_extra={"default": "the larger of 2 mm and 5 % of the object's half extent"},
+        json_schema_extra={"default": "the larger of 2 mm and 5 % of the characteristic length"},
     )
     replay_angle: NonNegative = Field(default=5.0, description="Angle between object and any goal then, degrees.")
     replay_dropped: NonNegative = Field(default=0.1, description="Share of perturbed replays that drop the object.")

@@ -10,9 +10,9 @@ from casadi_hands.task.object import ManipulatedObject
 from casadi_hands.task.problem import Problem
 from casadi_hands.task.task import Task
 
-# Share of the half extent within which a contact is moved onto the surface without a word.
+# Share of the characteristic length within which a contact is moved onto the surface without a word.
 CONTACT_TOLERANCE = 0.2
-# Lengths below this share of the half extent are rounding: nothing is moved for them, so that normalising a task
+# Of the characteristic length; shorter lengths are rounding: nothing is moved for them, so that normalising a task
 # twice, or saving and loading it, leaves it equal to the last digit.
 _ROUNDING = 1e-12
 
@@ -42,7 +42,7 @@ def _snap(point: Vector, body: ManipulatedObject, path: tuple[str, ...], problem
     distances = [abs(shape.body.signed_distance(start)) for shape in body.shapes]
     nearest = int(np.argmin(distances))
     shape, distance = body.shapes[nearest], distances[nearest]
-    given, tolerance = f"{list(point)}", CONTACT_TOLERANCE * body.half_extent
+    given, tolerance = f"{list(point)}", CONTACT_TOLERANCE * body.characteristic_length
     if distance > tolerance:
         allowed = f"a point within {tolerance:.3g} m of the object's surface; this one is {distance:.3g} m from it"
         problems.append(Problem(path, given, allowed))
@@ -50,9 +50,9 @@ def _snap(point: Vector, body: ManipulatedObject, path: tuple[str, ...], problem
     if not shape.body.has_normal(start):
         problems.append(Problem(path, given, "a point off the axis of its primitive, so that one side is nearest"))
         return point
-    snapped = start if distance <= _ROUNDING * body.half_extent else shape.body.on_surface(start)
+    snapped = start if distance <= _ROUNDING * body.characteristic_length else shape.body.on_surface(start)
     for number, other in enumerate(body.shapes):
-        if other is not shape and other.body.signed_distance(snapped) < -1e-6 * body.half_extent:
+        if other is not shape and other.body.signed_distance(snapped) < -1e-6 * body.characteristic_length:
             allowed = f"a point on the outside of the object; this one lies inside object.shapes[{number}]"
             problems.append(Problem(path, given, allowed))
             return point
@@ -66,7 +66,7 @@ def _recentre(task: Task) -> Task:
     origin = (0.0, 0.0, 0.0)
     if not center.any():
         return task
-    if np.abs(center).max() <= _ROUNDING * body.half_extent:
+    if np.abs(center).max() <= _ROUNDING * body.characteristic_length:
         return task.model_copy(update={"object": body.model_copy(update={"center_of_mass": origin})})
 
     def shift(point: Vector) -> Vector:

@@ -72,7 +72,7 @@ class ManipulatedObject(Section):
         return inertia
 
     @property
-    def half_extent(self) -> float:
+    def characteristic_length(self) -> float:
         """Half the largest extent of the bounding box in the object frame, m: the unit of length inside."""
         lower, upper = self.bounding_box
         return float((upper - lower).max() / 2)
@@ -95,6 +95,6 @@ class ManipulatedObject(Section):
         down = rotation.T @ np.array([0.0, 0.0, -1.0])
         points = np.vstack([s.body.support(down) + s.body.ball * down for s in self.shapes])
         depths = points @ down
-        lowest = points[depths >= depths.max() - 1e-9 * self.half_extent]
+        lowest = points[depths >= depths.max() - 1e-9 * self.characteristic_length]
         middle: np.ndarray = lowest.mean(axis=0)
         return middle

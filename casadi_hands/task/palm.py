@@ -46,7 +46,7 @@ class Palm(Section):
     """
 
     radius: Positive = Field(
-        description="Radius of the disc, m.", json_schema_extra={"default": "1.2 × object's half extent"}
+        description="Radius of the disc, m.", json_schema_extra={"default": "1.2 × object's characteristic length"}
     )
     thickness: Positive = Field(
         default_factory=follows(lambda data: 0.2 * data["radius"]),

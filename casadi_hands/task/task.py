@@ -66,7 +66,7 @@ class Task(Section):
     @classmethod
     def _palm_defaults(cls, value: Any, info: ValidationInfo) -> Any:
         body = info.data.get("object")
-        return fill(value, radius=1.2 * body.half_extent if body else 1.0)
+        return fill(value, radius=1.2 * body.characteristic_length if body else 1.0)
 
     @field_validator("fingers")
     @classmethod
@@ -103,7 +103,7 @@ class Task(Section):
     @classmethod
     def _limits_defaults(cls, value: Any, info: ValidationInfo) -> Any:
         body = info.data.get("object")
-        return fill(value, replay_position=usual_replay_position(body.half_extent) if body else 1.0)
+        return fill(value, replay_position=usual_replay_position(body.characteristic_length) if body else 1.0)
 
     @property
     def draws(self) -> bool:

@@ -13,7 +13,7 @@ from casadi_hands.geometry.bodies.capsule import Segment
 from casadi_hands.geometry.pairs import core_distance
 from casadi_hands.nlp import Term, Weight
 
-_ROUNDING = 1e-3  # half the width of the spline's transition, half extents
+_ROUNDING = 1e-3  # half the width of the spline's transition, lengths
 
 COLLISION = Term(
     "collision",

@@ -12,7 +12,7 @@ from casadi_hands.nlp import Constraint
 _JOINTS = "more joints (search.max_joints)"
 _REACH = f"{_JOINTS} or a contact on the palm's side of the object"
 _ROOM = "thinner links (hand.link_radius), a palm farther away or contacts farther apart"
-_GRIP = "more friction or contacts that oppose each other better"
+_HOLDING = "more friction or contacts that oppose each other better"
 _TORQUE = "stronger motors (actuator.torque), a lighter object or more friction"
 _SIDE = f"{_JOINTS} or a contact that is pressed from another side"
 _PACE = "slower goals, more friction or more fingers"
@@ -52,13 +52,22 @@ ON_OBJECT = Constraint(
 ON_LINK = Constraint(
     "on_link", "eq. 2.19 as an equation", "length", "reach its contact", _REACH, (*_GAP, *_BALANCE, "slip")
 )
-REGULAR = Constraint(
-    "regular", "singularity margin", "", "follow without being stretched out or folded", _REACH, (*_GAP, "slip")
+SINGULARITY_MARGIN = Constraint(
+    "singularity_margin",
+    "singularity margin",
+    "",
+    "follow without being stretched out or folded",
+    _REACH,
+    (*_GAP, "slip"),
 )
-PRESSING = Constraint("pressing", "lower bound on the normal force", "force", "press firmly enough", _GRIP, ("pull",))
-CONE = Constraint("cone", "eq. 2.8: (μ f_n)² - f_t²", "", "press without slipping", _GRIP, ("friction_excess", "slip"))
+PRESSING = Constraint(
+    "pressing", "lower bound on the normal force", "force", "press firmly enough", _HOLDING, ("pull",)
+)
+CONE = Constraint(
+    "cone", "eq. 2.8: (μ f_n)² - f_t²", "", "press without slipping", _HOLDING, ("friction_excess", "slip")
+)
 ACTUATED = Constraint(
-    "passive",
+    "structural",
     "eq. 2.23: force borne by the structure",
     "force",
     "supply its force with its joints",

@@ -104,19 +104,19 @@ def cone_margin(force: SX, inward_normal: SX, friction: SX) -> SX:
     return friction * pressing - norm(force - pressing * inward_normal, 1e-3)
 
 
-def off_surface(force: SX, activity: SX, point: SX, projection: SX) -> SX:
+def off_surface(force: SX, invariant: SX, point: SX, projection: SX) -> SX:
     """‖f‖ c ‖proj(r) - r‖² (eq. 2.10 and its form for fingers); a plain value."""
-    return norm(force, 1e-3) * activity * ca.sumsqr(projection - point)
+    return norm(force, 1e-3) * invariant * ca.sumsqr(projection - point)
 
 
-def gap_rate(force: SX, activity: SX, gap: SX, gap_before: SX, step: SX) -> SX:
+def gap_rate(force: SX, invariant: SX, gap: SX, gap_before: SX, step: SX) -> SX:
     """‖c f‖ times the rate of proj(r) - r, (3,) (eq. 2.12); blind to sliding along the surface."""
-    return activity * norm(force, 1e-3) * (gap - gap_before) / step
+    return invariant * norm(force, 1e-3) * (gap - gap_before) / step
 
 
-def slip(force: SX, activity: SX, point: SX, point_before: SX, step: SX) -> SX:
+def slip(force: SX, invariant: SX, point: SX, point_before: SX, step: SX) -> SX:
     """‖c f‖ times the velocity of the contact point over its body, (3,); what eq. 2.12 was meant to see."""
-    return activity * norm(force, 1e-3) * (point - point_before) / step
+    return invariant * norm(force, 1e-3) * (point - point_before) / step
 
 
 def acceleration(point_before: SX, point: SX, point_after: SX, step: SX) -> SX:

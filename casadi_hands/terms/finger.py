@@ -13,7 +13,7 @@ from casadi_hands.nlp import Term, Weight
 # Of the Jacobian's singular values, lengths per rad: the lever below which a joint does not push.
 NULL_SPACE_DAMPING = 0.02
 _TORQUE_DAMPING = 1e-3  # λ of eq. A.5
-_ROUNDING = 1e-3  # half the width of the spline's transition, half extents or rad
+_ROUNDING = 1e-3  # half the width of the spline's transition, lengths or rad
 
 TIP_TARGET = Term(
     "tip_target",
@@ -74,7 +74,7 @@ BASE_ACCELERATION = Term(
     weights={"whole_hand": Weight(0.01)},
 )
 # The refinement's.
-PASSIVE_FORCE = Term(
+STRUCTURAL_FORCE = Term(
     "passive_force", "Force borne by the structure", "eq. 2.23", "m·g", weights={"refine": Weight(3.0, "knot")}
 )
 JOINT_ACCELERATION = Term(
@@ -110,7 +110,7 @@ def null_space_force(jacobian: SX, force: SX, damping: float = NULL_SPACE_DAMPIN
     return force - ca.mtimes(jacobian, solve_positive(normal_matrix, ca.mtimes(jacobian.T, force)))
 
 
-def unsupplied_force(jacobian: SX, force: SX, lever: float) -> SX:
+def structural_force(jacobian: SX, force: SX, least: float) -> SX:
     """The part (3,) of a force for which no joint has a lever: a sharper cut than damping.
 
     Of a force in a singular direction of the Jacobian with the lever σ, λ⁴/(σ⁴ + λ⁴) counts as not supplied.
@@ -118,10 +118,10 @@ def unsupplied_force(jacobian: SX, force: SX, lever: float) -> SX:
     Args:
         jacobian: (3, n) of the contact point, lengths/rad.
         force: (3,) in the same frame, m·g.
-        lever: λ, lengths/rad.
+        least: λ, lengths/rad.
     """
     squared = ca.mtimes(jacobian.T, jacobian)
-    normal_matrix = ca.mtimes(squared, squared) + lever**4 * SX.eye(jacobian.shape[1])
+    normal_matrix = ca.mtimes(squared, squared) + least**4 * SX.eye(jacobian.shape[1])
     torques = ca.mtimes(squared, ca.mtimes(jacobian.T, force))
     return force - ca.mtimes(jacobian, solve_positive(normal_matrix, torques))
 

@@ -166,6 +166,31 @@ class Capsule(_Round):
 class Cylinder(_Round):
     """A solid cylinder with sharp edges; ``start`` and ``end`` are the centres of its flat faces."""
 
+    def _beyond(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return how far (..., 2) points (..., 3) are beyond side and face, and the normals (..., 3) of both there."""
+        middle, along = 0.5 * (self.start + self.end), (self.end - self.start) / self.length
+        height = np.asarray((point - middle) @ along)
+        out = point - middle - height[..., None] * along
+        away = np.linalg.norm(out, axis=-1)
+        side = out / np.maximum(away, 1e-300)[..., None]
+        face = np.where(height >= 0, 1.0, -1.0)[..., None] * along
+        return np.stack([away - self.radius, np.abs(height) - 0.5 * self.length], axis=-1), side, face
+
+    def distance(self, point: np.ndarray) -> np.ndarray:
+        """See `Shape`."""
+        beyond, _, _ = self._beyond(point)
+        inside: np.ndarray = np.minimum(beyond.max(axis=-1), 0.0)
+        return np.linalg.norm(np.maximum(beyond, 0.0), axis=-1) + inside
+
+    def normal(self, point: np.ndarray) -> np.ndarray:
+        """See `Shape`; beyond an edge, away from it; zero on the axis where the side is nearest."""
+        beyond, side, face = self._beyond(point)
+        nearer = beyond == beyond.max(axis=-1, keepdims=True)
+        share = np.where(np.any(beyond > 0.0, axis=-1, keepdims=True), np.maximum(beyond, 0.0), nearer)
+        share = share / np.linalg.norm(share, axis=-1, keepdims=True)
+        normal: np.ndarray = share[..., :1] * side + share[..., 1:] * face
+        return normal
+
     @property
     def box(self) -> tuple[np.ndarray, np.ndarray]:
         """See `Shape`."""
@@ -247,5 +272,6 @@ class Form:
 FORMS = {
     "sphere": Form(Capsule, ("center",)),
     "capsule": Form(Capsule, ("start", "end")),
+    "cylinder": Form(Cylinder, ("start", "end"), ("radius", "edge_radius")),
 }
 """By the kind's name."""

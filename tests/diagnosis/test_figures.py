@@ -8,7 +8,7 @@ import pytest
 
 from casadi_hands.diagnosis import figures as words
 from casadi_hands.diagnosis.figures import friction_reason, missed_figures, speed_reason, torque_reason
-from casadi_hands.diagnosis.holding import MOST_GRIP
+from casadi_hands.diagnosis.holding import MOST_NORMAL_FORCE
 from casadi_hands.problem.motors import joint_motors
 from casadi_hands.task.hand import Actuator
 from casadi_hands.verify import Perturbation, Replay, Replays
@@ -19,7 +19,7 @@ from tests.export.example import example_design
 
 
 def test_enough_friction_gives_no_reason() -> None:
-    assert friction_reason(*still(0.5 / MOST_GRIP + 0.01)) is None
+    assert friction_reason(*still(0.5 / MOST_NORMAL_FORCE + 0.01)) is None
 
 
 def test_little_friction_is_told_with_the_grip_it_takes_and_what_would_do() -> None:

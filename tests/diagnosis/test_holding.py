@@ -1,4 +1,4 @@
-"""Grip, friction and torque against closed forms: a ball between two fingers, a capsule between three."""
+"""Holding, friction and torque against closed forms: a ball between two fingers, a capsule between three."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from casadi_hands.diagnosis.holding import HELD, MOST_GRIP, grips, least_friction, least_torque
+from casadi_hands.diagnosis.holding import HELD, MOST_NORMAL_FORCE, holdings, least_friction, least_torque
 from casadi_hands.export.design import Design
 from casadi_hands.problem.floating_motion import Floating
 from casadi_hands.problem.hand import Finger, Hand, Link
@@ -38,24 +38,24 @@ def still(friction: float, right: tuple[float, float, float] = (0, 1, 0)) -> tup
     pose[:, 2] = 3
     point = np.tile(np.array([[0.0, -1, 0], right]), (keyframes, 1, 1))
     active = np.ones((keyframes, 2), bool)
-    values = {"pose": pose, "point": point.reshape(keyframes, -1), "activity": active.astype(float)}
+    values = {"pose": pose, "point": point.reshape(keyframes, -1), "invariant": active.astype(float)}
     force = np.zeros((samples, 2, 3))
     return model, Floating(pose, point, force, active, active.astype(float), 0.0, made_up_solution(values), (), model)
 
 
 @pytest.mark.parametrize("friction", [0.05, 0.2, 1.0])
 def test_two_opposed_fingers_press_with_half_the_weight_over_the_friction(friction: float) -> None:
-    for grip in grips(*still(friction)):
-        assert grip.held
-        assert grip.hardest == pytest.approx(0.5 / friction, rel=1e-5)
+    for holding in holdings(*still(friction)):
+        assert holding.held
+        assert holding.hardest == pytest.approx(0.5 / friction, rel=1e-5)
 
 
 def test_another_friction_takes_the_task_s_place() -> None:
-    assert grips(*still(0.05), friction=0.4)[0].hardest == pytest.approx(1.25, rel=1e-5)
+    assert holdings(*still(0.05), friction=0.4)[0].hardest == pytest.approx(1.25, rel=1e-5)
 
 
 def test_the_least_friction_is_where_the_grip_is_the_most() -> None:
-    assert least_friction(*still(0.05)) == pytest.approx(0.5 / MOST_GRIP, rel=0.011)
+    assert least_friction(*still(0.05)) == pytest.approx(0.5 / MOST_NORMAL_FORCE, rel=0.011)
 
 
 def test_fingers_that_press_down_from_above_need_more_friction() -> None:
@@ -63,8 +63,8 @@ def test_fingers_that_press_down_from_above_need_more_friction() -> None:
     angle = np.radians(20)
     model, floating = still(0.3, right=(0, np.cos(angle), np.sin(angle)))
     floating.point[:, 0] = [0, -np.cos(angle), np.sin(angle)]
-    assert not grips(model, floating)[0].held
-    needed = (0.5 / MOST_GRIP + np.sin(angle)) / np.cos(angle)
+    assert not holdings(model, floating)[0].held
+    needed = (0.5 / MOST_NORMAL_FORCE + np.sin(angle)) / np.cos(angle)
     assert least_friction(model, floating) == pytest.approx(needed, rel=0.011)
 
 
@@ -76,9 +76,9 @@ def test_what_cannot_be_made_is_missing_whole() -> None:
     # Both fingers on top of the ball: no friction under 2 lifts it.
     model, floating = still(0.5, right=(0, 0, 1))
     floating.point[:, 0] = [0, 0, 1]
-    grip = grips(model, floating)[0]
-    assert not grip.held
-    np.testing.assert_allclose(grip.missing, [0, 0, 1, 0, 0, 0], atol=1e-9)
+    holding = holdings(model, floating)[0]
+    assert not holding.held
+    np.testing.assert_allclose(holding.missing, [0, 0, 1, 0, 0, 0], atol=1e-9)
     assert least_friction(model, floating) is None
 
 
@@ -86,7 +86,7 @@ def test_what_cannot_be_made_is_missing_whole() -> None:
 @pytest.mark.parametrize("friction", [0.1, 0.6])
 def test_it_agrees_with_the_floating_stage_s_gate(right: tuple[float, float, float], friction: float) -> None:
     model, floating = still(friction, right)
-    held = all(grip.held for grip in grips(model, floating))
+    held = all(holding.held for holding in holdings(model, floating))
     assert held == passes_gate(model, floating.solution.values)
 
 
@@ -107,7 +107,7 @@ def test_the_missing_wrench_is_the_least_that_any_forces_in_the_cones_leave() ->
 
     start = -0.3 * points.reshape(-1)
     best = minimize(left, start, constraints=[{"type": "ineq", "fun": inside}], options={"maxiter": 500, "ftol": 1e-12})
-    missing = float(np.linalg.norm(grips(model, floating)[0].missing))
+    missing = float(np.linalg.norm(holdings(model, floating)[0].missing))
     assert missing > HELD
     assert np.sqrt(best.fun) <= missing + 1e-6
     assert missing <= np.sqrt(best.fun) + 0.08

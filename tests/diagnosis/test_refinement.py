@@ -34,14 +34,17 @@ def refined(
     contacts: tuple[int, ...],
     violation: float,
     time: float | None = None,
-    step: str = "exact",
-    share: float = 1.0,
+    step: str = "hard constraints",
+    homotopy: float = 1.0,
 ) -> Refined:
     """A refinement that is left with one violation."""
     hand = SimpleNamespace(contacts=(0, 1), fingers=(SimpleNamespace(joints=2), SimpleNamespace(joints=1)))
     slips, runs = {"left": 0.02, "right": 0.4}, (Run(step, made_up_solution({}), Margin()),)
-    worst, slips_hopelessly = Worst("shade.dark", violation, time, contacts, declared), not step.endswith("exact")
-    return Refined(hand, False, worst, slips, slips_hopelessly, slips_hopelessly, runs, {}, Margin(), share)  # type: ignore[arg-type]
+    worst, slips_hopelessly = (
+        Worst("shade.dark", violation, time, contacts, declared),
+        not step.endswith("hard constraints"),
+    )
+    return Refined(hand, False, worst, slips, slips_hopelessly, slips_hopelessly, runs, {}, Margin(), homotopy)  # type: ignore[arg-type]
 
 
 def test_an_exact_motion_needs_no_reason() -> None:
@@ -51,7 +54,7 @@ def test_an_exact_motion_needs_no_reason() -> None:
 
 
 def test_slip_is_laid_to_the_finger_that_slips_most() -> None:
-    made = refined(limits.NO_SLIP, (0,), 0.1, step="coarse firm")
+    made = refined(limits.NO_SLIP, (0,), 0.1, step="coarse stiff penalty")
     (reason,) = refined_reason(ball(), made)
     assert reason.what == "finger 'right' with 1 joint cannot roll with the object: it slips 12.0 mm"
     assert "search.max_joints" in reason.advice
@@ -94,7 +97,7 @@ def test_no_time_is_told_where_there_is_none() -> None:
 
 
 def test_how_far_a_hand_can_roll_is_told() -> None:
-    (reason,) = refined_reason(ball(), replace(refined(limits.ON_LINK, (0,), 0.0, share=0.75), met=True))
+    (reason,) = refined_reason(ball(), replace(refined(limits.ON_LINK, (0,), 0.0, homotopy=0.75), met=True))
     assert reason.what == "fingers can roll with the object over 75% of the way to its goals, and no farther"
     assert reason.explains == {"goal_position", "goal_angle"}
 

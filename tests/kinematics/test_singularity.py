@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.kinematics.morphology import FingerSeed
-from casadi_hands.kinematics.singularity import branches, folds
+from casadi_hands.kinematics.singularity import margin_directions, passes_singularity
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.placement import contact_jacobians
 from tests.stages.example import PinFinger, everything, made_up_solution
@@ -58,13 +58,15 @@ def bending(elbow: Array) -> tuple[WholeHand, Array]:
 
 
 def sides(elbow: Array, active: Array | None = None) -> tuple[Array, Array]:
-    """The regularity of the motion at each knot on the branch that is kept, and its size."""
+    """The singularity_margin of the motion at each knot on the branch that is kept, and its size."""
     hand, jacobians = bending(elbow)
-    regularity = np.linalg.det(jacobians)[:, None] if elbow.ndim == 2 else np.cross(*jacobians.transpose(2, 0, 1))
+    singularity_margin = (
+        np.linalg.det(jacobians)[:, None] if elbow.ndim == 2 else np.cross(*jacobians.transpose(2, 0, 1))
+    )
     active = np.ones(COUNT, bool) if active is None else active
-    branch = branches(contact_jacobians(MODEL, hand, 0), active, active | np.append(False, active[:-1]))
-    assert branch.shape == regularity.shape
-    return (branch * regularity).sum(axis=1), np.linalg.norm(regularity, axis=1)
+    branch = margin_directions(contact_jacobians(MODEL, hand, 0), active, active | np.append(False, active[:-1]))
+    assert branch.shape == singularity_margin.shape
+    return (branch * singularity_margin).sum(axis=1), np.linalg.norm(singularity_margin, axis=1)
 
 
 def with_elbow(joints: int, angles: Array) -> Array:
@@ -120,7 +122,7 @@ def test_a_finger_folds_where_it_passes_a_singular_pose_or_is_near_one_while_it_
     always = np.ones(COUNT, bool)
 
     def folds_with(elbow: Array, active: Array) -> bool:
-        return folds(bending(with_elbow(joints, elbow))[1], active)
+        return passes_singularity(bending(with_elbow(joints, elbow))[1], active)
 
     bent, over = np.full(COUNT, 0.8), np.where(np.arange(COUNT) < 4, 0.8, -0.8)
     assert not folds_with(bent, always)
@@ -134,4 +136,4 @@ def test_a_finger_folds_where_it_passes_a_singular_pose_or_is_near_one_while_it_
 
 @pytest.mark.parametrize("joints", [1, 4])
 def test_fingers_of_one_joint_or_many_never_fold(joints: int) -> None:
-    assert not folds(np.zeros((5, 3, joints)), np.ones(5, bool))
+    assert not passes_singularity(np.zeros((5, 3, joints)), np.ones(5, bool))

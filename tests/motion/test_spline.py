@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BPoly, CubicHermiteSpline
 
-from casadi_hands.motion import catmull_rom, eased, held, linear
+from casadi_hands.motion import catmull_rom, linear, time_scaled, zero_order_hold
 
 KNOTS = np.array([0.0, 0.5, 1.2, 2.0, 2.1, 3.0])
 
@@ -59,31 +59,31 @@ def test_linear_against_numpy_and_constant_beyond_its_ends(values: np.ndarray) -
 
 def test_held_changes_at_its_knot() -> None:
     times = [-1, 0, 0.49999, 0.5, 1.19, 2.0 - 1e-12, 2.05, 3.0, 9.0]
-    assert held(KNOTS, times).tolist() == [0, 0, 0, 1, 1, 3, 3, 5, 5]
+    assert zero_order_hold(KNOTS, times).tolist() == [0, 0, 0, 1, 1, 3, 3, 5, 5]
 
 
 def test_eased_time_is_the_quintic_that_rests_at_every_knot() -> None:
     times = np.linspace(0, 3, 301)
     expected = BPoly.from_derivatives(KNOTS, [[knot, 0, 0] for knot in KNOTS])(times)
-    np.testing.assert_allclose(eased(KNOTS, times), expected, atol=1e-12)
+    np.testing.assert_allclose(time_scaled(KNOTS, times), expected, atol=1e-12)
 
 
 def test_eased_time_keeps_its_knots_and_never_turns_back() -> None:
-    np.testing.assert_allclose(eased(KNOTS, KNOTS), KNOTS, atol=1e-12)
-    np.testing.assert_array_equal(eased(KNOTS, [-1.0, 4.0]), [0.0, 3.0])
-    assert (np.diff(eased(KNOTS, np.linspace(0, 3, 2001))) >= 0).all()
+    np.testing.assert_allclose(time_scaled(KNOTS, KNOTS), KNOTS, atol=1e-12)
+    np.testing.assert_array_equal(time_scaled(KNOTS, [-1.0, 4.0]), [0.0, 3.0])
+    assert (np.diff(time_scaled(KNOTS, np.linspace(0, 3, 2001))) >= 0).all()
     # Halfway it is on time, whatever the interval's length, and nearly twice as fast.
     middles = (KNOTS[1:] + KNOTS[:-1]) / 2
-    np.testing.assert_allclose(eased(KNOTS, middles), middles, atol=1e-12)
+    np.testing.assert_allclose(time_scaled(KNOTS, middles), middles, atol=1e-12)
     h = 1e-5
-    speeds = (eased(KNOTS, middles + h) - eased(KNOTS, middles - h)) / (2 * h)
+    speeds = (time_scaled(KNOTS, middles + h) - time_scaled(KNOTS, middles - h)) / (2 * h)
     np.testing.assert_allclose(speeds, 15 / 8, rtol=1e-6)
 
 
 @pytest.mark.parametrize("knot", KNOTS)
 def test_what_follows_eased_time_rests_at_every_knot(knot: float, values: np.ndarray) -> None:
     h = 1e-3
-    before, at, after = (linear(KNOTS, eased(KNOTS, [knot + k * h])) @ values for k in (-1, 0, 1))
+    before, at, after = (linear(KNOTS, time_scaled(KNOTS, [knot + k * h])) @ values for k in (-1, 0, 1))
     # It leaves a knot by the third power of time: no speed, no acceleration.
     for moved in (after - at, at - before):
         assert np.abs(moved).max() < 10 * np.ptp(values) * (h / 0.1) ** 3

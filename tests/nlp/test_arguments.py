@@ -141,7 +141,9 @@ def test_later_places_are_later(knots: Knots) -> None:
     now, later = np.arange(3), np.arange(1, 4)
     swapped = {"pose0": knots.pose.take(later), "pose1": knots.pose.take(now)}
     knots.refused(r"^rolling\.pose1: is not later than pose0$", **swapped)
-    knots.refused(r"^rolling\.step1: is not later than step0$", step0=knots.step.take(later), step1=knots.step.take(now))
+    knots.refused(
+        r"^rolling\.step1: is not later than step0$", step0=knots.step.take(later), step1=knots.step.take(now)
+    )
     knots.refused(r"^rolling\.pose1: is not later than pose0$", pose1=knots.pose.take(now))
     # At times that are not told they are what they are said to be.
     check_arguments(rolling(), knots.arguments(pose0=knots.pose.combine(np.eye(4)[:3])))

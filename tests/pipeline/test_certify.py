@@ -15,7 +15,7 @@ from casadi_hands.pipeline import certify
 from casadi_hands.pipeline import refiner as refiner_module
 from casadi_hands.pipeline.certify import Certifier
 from casadi_hands.pipeline.record import Record
-from casadi_hands.pipeline.refiner import AMPLE, FIRM, Refiner, intervals_to_halve
+from casadi_hands.pipeline.refiner import AMPLE, LARGE, Refiner, intervals_to_halve
 from casadi_hands.problem.si import build_model
 from casadi_hands.stages.refine.result import Run, Worst
 from casadi_hands.stages.refine.values import Margin
@@ -69,7 +69,7 @@ class Loop(Certifier):
             barely_rolls=slips,
             slips={"left": 1.0, "right": 0.1},
             worst=Worst("some.constraint", 1.0, None, contacts),
-            share=1.0,
+            homotopy=1.0,
         )
         self.record.add_runs([{"stage": "refine", "what": len(self.tried)}])
         certificate = {str(i): {"holds": i >= missed} for i in range(9)}
@@ -146,7 +146,7 @@ def test_a_design_there_is_already_is_returned_where_no_hand_is_better(monkeypat
         status = "failed" if known[0] else "certified"
         certificate = {str(i): {"holds": i >= known[0]} for i in range(9)}
         judged = replace(loop.record.design, status=status, reason="attempt 0", certificate=certificate)
-        loop.record.offer(judged if known[0] else replayed(judged, known[1]))
+        loop.record.update_best(judged if known[0] else replayed(judged, known[1]))
         design = loop.run(found((1, 1), (1, 1)))
         assert design.reason == f"attempt {best}"
 
@@ -156,7 +156,7 @@ def test_a_design_there_is_already_is_better_than_a_hand_far_from_its_contacts(
 ) -> None:
     loop = Loop(monkeypatch, [], max_joints=3)
     known = replayed(replace(loop.record.design, status="certified", reason="known"), 0)
-    loop.record.offer(known)
+    loop.record.update_best(known)
     assert loop.run(found((1, 1), farthest=0.31)).reason == "known"
 
 
@@ -170,13 +170,13 @@ def test_what_a_firmer_grip_changes_is_told_from_the_hand_before_any_refinement(
     def solve(start: object, margin: Margin, near: bool) -> Any:
         asked.append((start, margin, near))
         other = Run("firm", made_up_solution({}), AMPLE)
-        return SimpleNamespace(hand=firm, runs=(other, Run("exact", solution, FIRM), other))
+        return SimpleNamespace(hand=firm, runs=(other, Run("exact", solution, LARGE), other))
 
     told: Any = {}
     monkeypatch.setattr(refiner_module, "design_change", lambda _, before, after: {"from": before, "to": after})
     record = Record(ball_task(), None, lambda _: None)
-    Refiner(record, told, told, 1)._attempt(whole, FIRM, partial(solve, exact, near=True))  # type: ignore[arg-type]
-    assert asked == [(exact, FIRM, True)]
+    Refiner(record, told, told, 1)._attempt(whole, LARGE, partial(solve, exact, near=True))  # type: ignore[arg-type]
+    assert asked == [(exact, LARGE, True)]
     changes = [run.get("design_change") for run in record.design.stages]
     assert changes == [None, {"from": whole, "to": firm}, None]
     # Each solve is told with the margin that it kept, whatever was asked for at first.
@@ -227,9 +227,9 @@ def test_what_is_missed_only_between_samples_gets_more_of_them(
         return SimpleNamespace(figures={**kept, missed: Figure(missed, parts.sum(), 1.0, "m", "", by_interval=parts)})
 
     monkeypatch.setattr(refiner_module, "Continuation", Once)
-    monkeypatch.setattr(Refiner, "_regripped", lambda *_: SimpleNamespace(exact=False))  # no grip is any better
+    monkeypatch.setattr(Refiner, "_with_margin", lambda *_: SimpleNamespace(exact=False))  # no grip is any better
     monkeypatch.setattr(refiner_module, "resampled", lambda hand, before, after: hand)
-    monkeypatch.setattr(Refiner, "_attempt", lambda self, whole, margin, way: way(margin=margin))
+    monkeypatch.setattr(Refiner, "_attempt", lambda self, whole, margin, refine: refine(margin=margin))
     monkeypatch.setattr(Refiner, "_judged", judged)
     monkeypatch.setattr(Refiner, "_replayed", lambda self, design: design)
     judge: Any = SimpleNamespace(audited=audited)
@@ -259,24 +259,24 @@ class Ways:
     def solve(self, start: Any, margin: Margin, near: bool) -> Any:
         return self.taken("solve", margin)
 
-    def lengthen(self, start: Any, share: float, margin: Margin, firmer: Margin) -> Any:
-        assert (share, margin, firmer) == (0.5, AMPLE, FIRM)
-        return self.taken("lengthen", firmer if self.firm else margin)
+    def continue_from(self, start: Any, homotopy: float, margin: Margin, firmer: Margin) -> Any:
+        assert (homotopy, margin, firmer) == (0.5, AMPLE, LARGE)
+        return self.taken("continue_from", firmer if self.firm else margin)
 
-    def regrip(self, exact: Any, margin: Margin) -> Any:
-        return self.taken("regrip", margin)
+    def with_margin(self, exact: Any, margin: Margin) -> Any:
+        return self.taken("with_margin", margin)
 
     def passes_through(self, refined: Any) -> bool:
         return self.passes
 
 
 def refine(
-    monkeypatch: pytest.MonkeyPatch, ways: Ways, share: float, statuses: list[str], drops: list[int]
+    monkeypatch: pytest.MonkeyPatch, ways: Ways, homotopy: float, statuses: list[str], drops: list[int]
 ) -> tuple[Margin, int]:
     """The margin of what is kept and its drops, where designs and drops are judged as told, in this order."""
     judged, dropped = iter(statuses), iter(drops)
     monkeypatch.setattr(refiner_module, "Continuation", lambda *_: ways)
-    monkeypatch.setattr(Refiner, "_attempt", lambda self, whole, margin, way: way(margin=margin))
+    monkeypatch.setattr(Refiner, "_attempt", lambda self, whole, margin, refine: refine(margin=margin))
     monkeypatch.setattr(Refiner, "_judged", lambda self, *_: replace(self.record.design, status=next(judged)))
 
     def played(self: Refiner, design: Design) -> Design:
@@ -286,28 +286,28 @@ def refine(
     whole: Any = SimpleNamespace(contacts=(0, 1), fingers=(), active=None)
     record, unused = Record(ball_task(), None, lambda _: None), SimpleNamespace()
     refiner = Refiner(record, unused, unused, 1)  # type: ignore[arg-type]
-    design, refined = refiner.certify(whole, (), share=share)
+    design, refined = refiner.certify(whole, (), homotopy=homotopy)
     assert (next(judged, None), next(dropped, None)) == (None, None)
     return refined.margin, design.drops or 0
 
 
-@pytest.mark.parametrize("share", [1.0, 0.5])
+@pytest.mark.parametrize("homotopy", [1.0, 0.5])
 @pytest.mark.parametrize(
-    ("drops", "kept"), [([4, 2], FIRM), ([1, 0], FIRM), ([4, 4], AMPLE), ([4, 5], AMPLE), ([0], AMPLE)]
+    ("drops", "kept"), [([4, 2], LARGE), ([1, 0], LARGE), ([4, 4], AMPLE), ([4, 5], AMPLE), ([0], AMPLE)]
 )
 def test_a_firmer_grip_is_tried_where_replays_drop_and_kept_where_they_drop_less(
-    monkeypatch: pytest.MonkeyPatch, share: float, drops: list[int], kept: Margin
+    monkeypatch: pytest.MonkeyPatch, homotopy: float, drops: list[int], kept: Margin
 ) -> None:
     ways = Ways(firm=False)
-    assert refine(monkeypatch, ways, share, ["certified"] * len(drops), drops) == (kept, min(drops))
-    first = ("solve" if share == 1 else "lengthen", AMPLE)
-    assert ways.asked == [first, *[("regrip", FIRM)] * (len(drops) - 1)]
+    assert refine(monkeypatch, ways, homotopy, ["certified"] * len(drops), drops) == (kept, min(drops))
+    first = ("solve" if homotopy == 1 else "continue_from", AMPLE)
+    assert ways.asked == [first, *[("with_margin", LARGE)] * (len(drops) - 1)]
 
 
 def test_a_long_way_is_gone_with_a_firm_grip_at_once_where_it_can_be(monkeypatch: pytest.MonkeyPatch) -> None:
     ways = Ways(firm=True)
-    assert refine(monkeypatch, ways, 0.5, ["certified"], [4]) == (FIRM, 4)
-    assert ways.asked == [("lengthen", FIRM)]
+    assert refine(monkeypatch, ways, 0.5, ["certified"], [4]) == (LARGE, 4)
+    assert ways.asked == [("continue_from", LARGE)]
 
 
 @pytest.mark.parametrize(
@@ -315,7 +315,7 @@ def test_a_long_way_is_gone_with_a_firm_grip_at_once_where_it_can_be(monkeypatch
     [
         (["feasible", "certified"], [0], AMPLE),
         (["feasible", "certified", "certified"], [4, 4], AMPLE),
-        (["feasible", "feasible"], [], FIRM),
+        (["feasible", "feasible"], [], LARGE),
     ],
 )
 def test_where_the_audit_refuses_a_firm_grip_over_a_long_way_the_looser_one_is_judged(
@@ -324,17 +324,17 @@ def test_where_the_audit_refuses_a_firm_grip_over_a_long_way_the_looser_one_is_j
     ways = Ways(firm=True)
     margin, _ = refine(monkeypatch, ways, 0.5, statuses, drops)
     assert margin == kept
-    assert ways.asked[:2] == [("lengthen", FIRM), ("regrip", AMPLE)]
+    assert ways.asked[:2] == [("continue_from", LARGE), ("with_margin", AMPLE)]
 
 
-@pytest.mark.parametrize(("second", "kept"), [("certified", FIRM), ("feasible", AMPLE)])
+@pytest.mark.parametrize(("second", "kept"), [("certified", LARGE), ("feasible", AMPLE)])
 def test_where_the_audit_refuses_an_exact_motion_a_firmer_grip_is_judged(
     monkeypatch: pytest.MonkeyPatch, second: str, kept: Margin
 ) -> None:
     ways = Ways(firm=False)
     drops = [0] if second == "certified" else []
     assert refine(monkeypatch, ways, 1.0, ["feasible", second], drops) == (kept, 0)
-    assert ways.asked == [("solve", AMPLE), ("regrip", FIRM)]
+    assert ways.asked == [("solve", AMPLE), ("with_margin", LARGE)]
 
 
 def test_where_fingers_pass_through_each_other_no_other_grip_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -378,21 +378,21 @@ fingers: {left: {touches: [0.03, 0, 0]}, right: {touches: [-0.03, 0, 0]}}
 """
 
 
-@pytest.mark.parametrize("held_back", [True, False])
+@pytest.mark.parametrize("limits_travel", [True, False])
 def test_only_where_contacts_are_held_back_refinements_begin_with_a_part_of_the_way(
-    monkeypatch: pytest.MonkeyPatch, held_back: bool
+    monkeypatch: pytest.MonkeyPatch, limited_travel: bool
 ) -> None:
     model, given = build_model(parse_task(SPHERE)), SimpleNamespace(name="the whole way")
     asked: list[Any] = []
-    monkeypatch.setattr(type(model), "held_back", held_back)
+    monkeypatch.setattr(type(model), "limits_travel", limited_travel)
     monkeypatch.setattr(certify, "run_shortened", lambda record, part, whole: asked.append((part, whole)) or "a part")
     anything: Any = None
     begun = Certifier(anything, model, given, anything, anything, 1)._begun  # type: ignore[arg-type]
-    if not held_back:
+    if not limited_travel:
         assert begun == (model, given, 1.0)
         assert asked == []
         return
-    part, floating, share = begun
-    assert (floating, share) == ("a part", pytest.approx(0.75))  # 90 of 120 degrees
+    part, floating, homotopy = begun
+    assert (floating, homotopy) == ("a part", pytest.approx(0.75))  # 90 of 120 degrees
     assert asked == [(part, given)]
     np.testing.assert_allclose(np.degrees(part.goal_vectors[:, 2]), [0, -90, 45], atol=1e-9)

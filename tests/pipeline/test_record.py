@@ -78,7 +78,7 @@ def test_nothing_unfinished_takes_the_place_of_a_judged_design(tmp_path: Path) -
     kept = record([], tmp_path)
     kept.keep_unfinished("stopped early")
     assert Design.load(tmp_path).reason == "stopped early"
-    kept.offer(replace(kept.design, status="feasible", reason="slips a little"))
+    kept.update_best(replace(kept.design, status="feasible", reason="slips a little"))
     kept.keep_unfinished("stopped while another hand was tried")
     loaded = Design.load(tmp_path)
     assert (loaded.status, loaded.reason) == ("feasible", "slips a little")
@@ -86,10 +86,10 @@ def test_nothing_unfinished_takes_the_place_of_a_judged_design(tmp_path: Path) -
 
 def test_what_was_not_replayed_is_not_called_certified(tmp_path: Path) -> None:
     kept = record([], tmp_path)
-    kept.offer(replace(kept.design, status="certified", reason=""))
+    kept.update_best(replace(kept.design, status="certified", reason=""))
     loaded = Design.load(tmp_path)
     assert (loaded.status, loaded.reason) == ("feasible", "its files hold; it was stopped before it was replayed")
-    kept.offer(replayed(replace(kept.design, status="certified", reason=""), 1))
+    kept.update_best(replayed(replace(kept.design, status="certified", reason=""), 1))
     assert Design.load(tmp_path).status == "certified"
 
 
@@ -104,6 +104,6 @@ def test_the_best_design_is_written_as_soon_as_it_is_known(tmp_path: Path) -> No
     offers += ("none", (), None), ("equal", (), None), ("fewer drops", (), 3), ("more", (), 5), ("held", (), 0)
     best = []
     for reason, missed, drops in offers:
-        best.append(kept.offer(judged(reason, missed, drops)).reason)
+        best.append(kept.update_best(judged(reason, missed, drops)).reason)
         assert Design.load(tmp_path).reason == best[-1]
     assert best == ["two", "one", "one", "none", "none", "fewer drops", "fewer drops", "held"]

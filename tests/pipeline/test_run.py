@@ -13,7 +13,7 @@ from casadi_hands.errors import DesignError, SolveError
 from casadi_hands.export.design import Design
 from casadi_hands.pipeline import Progress, run, solve
 from casadi_hands.pipeline.record import Record
-from casadi_hands.pipeline.refiner import FIRM, Refiner
+from casadi_hands.pipeline.refiner import LARGE, Refiner
 from casadi_hands.task import parse_task
 from tests.pipeline.replayed import replayed
 from tests.pipeline.test_warm_start import HELD, earlier, edited, pressing
@@ -58,7 +58,7 @@ def test_a_certified_refinement_of_the_earlier_hand_is_the_result(
     monkeypatch.setattr(run, "_run", never)
     solve(parse_task(edited("[0.115, 0, 0.3] -> [0.115, 0.005, 0.3]")), jobs=1, out=tmp_path / "out", start=folder)
     (call,) = calls
-    assert (call["short"], call["margin"], call["near"]) == ((), FIRM, True)
+    assert (call["short"], call["margin"], call["near"]) == ((), LARGE, True)
     np.testing.assert_allclose(call["motion"].object_position[10], [0.115, 0.005, 0.3], atol=1e-9)
     np.testing.assert_allclose(call["whole"].position[10] * 0.06, [0.115, 0.005, 0.3], atol=1e-9)
     loaded = Design.load(tmp_path / "out")
@@ -88,7 +88,7 @@ def test_where_it_does_not_serve_all_stages_are_run_and_know_of_it(
         # Without the earlier hand, which is not that of the motions to come.
         assert (record.design.hand, record.design.motion) == (None, None)
         worse = {"slip": {"holds": False}, "gap": {"holds": False}}
-        return record.offer(replace(record.design, certificate=worse))
+        return record.update_best(replace(record.design, certificate=worse))
 
     monkeypatch.setattr(run, "_run", all_stages)
     news: list[Progress] = []

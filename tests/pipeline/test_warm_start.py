@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from casadi_hands.errors import SolveError
 from casadi_hands.export.design import Design
-from casadi_hands.pipeline.refiner import AMPLE, FIRM, SMALL
+from casadi_hands.pipeline.refiner import AMPLE, LARGE, SMALL
 from casadi_hands.pipeline.warm_start import as_floating, kept_margin, warm_start
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.motion import Motion
@@ -22,7 +22,7 @@ from tests.export.example import BASES, HEIGHT, LENGTHS, TASK, example_hand, exa
 
 # One keyframe between goals puts the samples where the motion's are.
 HELD = TASK.replace("ground: {height: 0.2, friction: 0.8}\n", "keyframes_between: 1\nhand: {link_radius: 0.008}\n")
-LENGTH, WEIGHT = 0.06, 0.1 * 9.81  # half extent and weight of the capsule
+LENGTH, WEIGHT = 0.06, 0.1 * 9.81  # characteristic length and weight of the capsule
 
 
 def edited(*changes: str) -> str:
@@ -230,7 +230,7 @@ def pressing(normal: float, across: float) -> Motion:
 @pytest.mark.parametrize(
     ("normal", "across", "status", "margin"),
     [
-        (4.1, 0.8, "certified", FIRM),
+        (4.1, 0.8, "certified", LARGE),
         (3.0, 0.6, "certified", AMPLE),
         (1.5, 0.3, "certified", AMPLE),
         (1.5, 0.5, "certified", SMALL),  # two thirds of the friction

@@ -36,7 +36,7 @@ def test_units_by_hand() -> None:
     assert units.force == pytest.approx(0.2 * 9.81)
     assert units.torque == pytest.approx(0.2 * 9.81 * 0.0475)
     assert units.inertial == pytest.approx(0.0475 / 9.81)
-    assert task.object.half_extent == pytest.approx(0.0475)
+    assert task.object.characteristic_length == pytest.approx(0.0475)
 
 
 def test_force_unit_without_gravity_is_the_weight_it_would_have() -> None:
@@ -132,7 +132,7 @@ def test_goals_are_missed_by_no_more_than_the_task_allows() -> None:
 
 
 def test_gaps_and_slips_are_a_part_of_the_task_s_limits_and_never_large() -> None:
-    # A fifth of a gap of 30 µm and of a slip of 0.2 mm; 2e-4 and 2e-3 half extents of 47.5 mm at most.
+    # A fifth of a gap of 30 µm and of a slip of 0.2 mm; 2e-4 and 2e-3 lengths of 47.5 mm at most.
     text = everything_text().replace("gap: 5e-05", "gap: 3e-05")
     model = build_model(parse_task(text))
     assert model.gap_tolerance * 0.0475 == pytest.approx(6e-6, rel=1e-9)
@@ -217,5 +217,5 @@ def test_lengths_and_gravity_ten_times_larger_give_the_same_motion(name: str) ->
     assert larger.units.force == pytest.approx(10 * model.units.force)
     weights = dict(task.weights.floating)
     one, other = FloatingStage(model).solve(weights), FloatingStage(larger).solve(weights)
-    for field in ("pose", "point", "force", "active", "activity"):
+    for field in ("pose", "point", "force", "active", "invariant"):
         np.testing.assert_array_equal(getattr(one, field), getattr(other, field))

@@ -58,7 +58,9 @@ def test_variation_is_a_task_like_the_first(file: Path, tmp_path: Path) -> None:
         made, change = write_variation(file, number, 0, tmp_path)
         old, new = load_task(file), load_task(made)
         assert new.object.mass / old.object.mass == pytest.approx(change.mass, rel=1e-6)
-        assert new.object.half_extent / old.object.half_extent == pytest.approx(change.size, rel=1e-6)
+        assert new.object.characteristic_length / old.object.characteristic_length == pytest.approx(
+            change.size, rel=1e-6
+        )
         assert 0.8 <= change.size <= 1.2
         assert 0.7 <= change.mass <= 1.3
         assert 0.8 <= change.goal <= 1.2
@@ -139,7 +141,7 @@ fingers: {left: {touches: [0, 0.02, 0.02]}, right: {touches: [0, -0.02, 0.02]}}
     np.testing.assert_allclose(np.array(rotation["axis"]) * rotation["degrees"], [0, 0, -180.0])
     np.testing.assert_allclose(made["fingers"]["left"]["touches"], [0, 0.022, 0.022], atol=1e-9)
     assert made["object"]["mass"] == pytest.approx(0.08)
-    assert parse_task(str(made).replace("'", '"')).object.half_extent == pytest.approx(1.1 * 0.04)
+    assert parse_task(str(made).replace("'", '"')).object.characteristic_length == pytest.approx(1.1 * 0.04)
 
 
 def test_turn_about_another_axis_is_scaled_from_the_first_orientation() -> None:

@@ -91,7 +91,7 @@ def made_up_values(model: Model, seed: int = 0) -> dict[str, Array]:
         "pose": np.hstack([rng.uniform(-0.6, 0.9, (keyframes, 3)), rng.uniform(-1.2, 1.2, (keyframes, 3))]),
         "point": (patches + 0.1 * rng.normal(size=(keyframes, contacts, 3))).reshape(keyframes, -1),
         "force": rng.normal(size=(samples, 3 * contacts)),
-        "activity": rng.uniform(0.1, 0.9, (keyframes, contacts)),
+        "invariant": rng.uniform(0.1, 0.9, (keyframes, contacts)),
         **({"force_perturbed": rng.normal(size=(samples, 3 * contacts))} if model.disturbance is not None else {}),
     }
 
@@ -113,7 +113,7 @@ def made_up_solution(values: dict[str, Array], objective: float = 1.0, **terms: 
 def made_up_floating(model: Model, seed: int = 0) -> Floating:
     """The same with flags of 0 and 1; every finger lifts once, away from the ends."""
     values = made_up_values(model, seed)
-    keyframes, contacts = values["activity"].shape
+    keyframes, contacts = values["invariant"].shape
     active = np.ones((keyframes, contacts), bool)
     for c in range(contacts):
         active[1 + c % (keyframes - 2), c] = False
@@ -122,7 +122,7 @@ def made_up_floating(model: Model, seed: int = 0) -> Floating:
         point=values["point"].reshape(keyframes, contacts, 3),
         force=values["force"].reshape(-1, contacts, 3),
         active=active,
-        activity=values["activity"],
+        invariant=values["invariant"],
         threshold=0.2,
         solution=made_up_solution(values),
         runs=(),

@@ -13,7 +13,7 @@ from casadi_hands.nlp import Solution
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
 from casadi_hands.stages.refine.result import Refined
-from casadi_hands.stages.refine.settings import LAST
+from casadi_hands.stages.refine.settings import LAST_STEP
 from casadi_hands.stages.refine.stage import RefineStage
 from casadi_hands.stages.refine.values import Margin
 from tests.stages.example import drawing, everything, made_up_finger, made_up_solution, project
@@ -111,7 +111,7 @@ class MadeUp:
     def refined(self, solution: Solution, margin: Margin | None = None) -> Refined:
         """What the stage makes of a solution that each of its solves returns."""
         with patch.object(self.stage.solver, "solve", return_value=solution):
-            return self.stage.take(LAST, self.start, margin or Margin())
+            return self.stage.take(LAST_STEP, self.start, margin or Margin())
 
     @property
     def turns(self) -> list[Rotation]:

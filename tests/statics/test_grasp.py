@@ -42,7 +42,7 @@ def plan(model: Model, *active: int, pose: np.ndarray | None = None) -> dict[str
     return {
         "pose": np.zeros((keyframes, 6)) if pose is None else pose,
         "point": np.tile(model.patches.reshape(1, -1), (keyframes, 1)),
-        "activity": np.tile(active or np.ones(model.contacts), (keyframes, 1)),
+        "invariant": np.tile(active or np.ones(model.contacts), (keyframes, 1)),
     }
 
 

@@ -39,7 +39,7 @@ def test_half_extent_is_half_the_longest_side_of_the_box() -> None:
     lower, upper = body.bounding_box
     assert lower == pytest.approx([-0.04, -0.01, -0.015])
     assert upper == pytest.approx([0.06, 0.035, 0.015])
-    assert body.half_extent == pytest.approx(0.05)
+    assert body.characteristic_length == pytest.approx(0.05)
 
 
 def test_lowest_point_is_lowest_of_points_on_the_surface() -> None:

@@ -91,7 +91,7 @@ def holds(task: Task, vector: np.ndarray, push: np.ndarray, resting: bool) -> bo
             columns.append(np.concatenate([edge, np.cross(point, edge)]))
     weight = task.object.mass * np.array(task.gravity)
     needed = -np.concatenate([weight, np.zeros(3)]) - push
-    scale = np.array([1.0] * 3 + [task.object.half_extent] * 3) * task.force_unit
+    scale = np.array([1.0] * 3 + [task.object.characteristic_length] * 3) * task.force_unit
     # Torques within 1e-3 of weight × size: figures typed to a tenth of a millimetre are not balanced better.
     slack = np.diag(scale)
     result = linprog(

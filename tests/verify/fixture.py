@@ -77,17 +77,22 @@ def _inertial(link: ElementTree.Element, mass: float, center: Any, inertia: np.n
 
 
 def _capsule(link: ElementTree.Element, start: Any, end: Any, radius: float) -> None:
-    start, end = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
-    axis = end - start
+    bar = np.any(np.subtract(end, start))
     for role in ("visual", "collision"):
-        for at in (start, end) if np.any(axis) else (start,):
+        for at in (start, end) if bar else (start,):
             _shape(link, role, "sphere", at, [0.0, 0.0, 0.0], radius=radius)
-        if np.any(axis):
-            length = float(np.linalg.norm(axis))
-            x, y, z = axis / length
-            # Rolling by a about x and pitching by b about y takes z to (sin b cos a, -sin a, cos b cos a).
-            turn = [np.arcsin(-y), np.arctan2(x, z), 0.0]
-            _shape(link, role, "cylinder", (start + end) / 2, turn, radius=radius, length=length)
+    if bar:
+        _cylinder(link, start, end, radius)
+
+
+def _cylinder(link: ElementTree.Element, start: Any, end: Any, radius: float) -> None:
+    start, end = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
+    length = float(np.linalg.norm(end - start))
+    x, y, z = (end - start) / length
+    for role in ("visual", "collision"):
+        # Rolling by a about x and pitching by b about y takes z to (sin b cos a, -sin a, cos b cos a).
+        turn = [np.arcsin(-y), np.arctan2(x, z), 0.0]
+        _shape(link, role, "cylinder", (start + end) / 2, turn, radius=radius, length=length)
 
 
 def _shape(link: ElementTree.Element, role: str, kind: str, at: Any, turn: Any, **sizes: float) -> None:
@@ -206,6 +211,7 @@ def _shape_given(shape: Any) -> tuple[str, dict[str, Any]]:
 _SOLIDS: dict[str, Callable[[ElementTree.Element, dict[str, Any]], None]] = {
     "sphere": lambda link, given: _capsule(link, given["center"], given["center"], given["radius"]),
     "capsule": lambda link, given: _capsule(link, given["start"], given["end"], given["radius"]),
+    "cylinder": lambda link, given: _cylinder(link, given["start"], given["end"], given["radius"]),
 }
 
 
@@ -225,7 +231,7 @@ GRASP = np.vstack([np.hstack([np.eye(3)] * 3), np.hstack([_skew(point) for point
 
 _TASK = """
 name: carried
-object: {{mass: 0.1, shapes: [{{capsule: {{start: [0, 0, -0.03], end: [0, 0, 0.03], radius: 0.02}}}}]}}
+object: {{mass: 0.1, shapes: [{{{shape}: {{start: [0, 0, -0.03], end: [0, 0, 0.03], radius: 0.02}}}}]}}
 palm: {{radius: 0.05, position: [0, 0, 0.2], facing: [0, 0, 1], moves: true}}
 motion:
 {goals}
@@ -237,23 +243,25 @@ limits: {{unsupplied_force: 10}}
 """
 
 
-def carried(directory: Path, more: str = "") -> Scene:
-    """Three fingers of two joints, held stiff, and a capsule between them; the palm carries all along a free curve.
+def carried(directory: Path, more: str = "", shape: str = "capsule") -> Scene:
+    """Three fingers of two joints, held stiff, and an object between them; the palm carries all along a free curve.
 
-    Forces are chosen first and SciPy integrates the capsule under them; the palm then follows it rigidly. So physics
+    Forces are chosen first and SciPy integrates the object under them; the palm then follows it rigidly. So physics
     holds to the integrator's 1e-12, nothing slips, and the contact points stay where they are. It starts and ends at
     rest. Where the task has perturbations, the least forces beside the plan's bear them.
 
     Args:
         directory: for the task's file.
         more: sections of the task beside those of `_TASK`.
+        shape: of the object, ``capsule`` or ``cylinder``; contacts are on the side that both have.
     """
     time, ends = np.linspace(0.0, 2.0, 21), [[0, 0, 0.28]] * 2
-    draft = _TASK.format(*(c.tolist() for c in CONTACTS), goals=_goals([0, 2], ends, [[1, 0, 0, 0]] * 2))
+    places = [c.tolist() for c in CONTACTS]
+    draft = _TASK.format(*places, shape=shape, goals=_goals([0, 2], ends, [[1, 0, 0, 0]] * 2))
     task = read_task(directory, draft)
     forces, position, quaternion = _carrying(task)
     goals = _goals([0, 1, 2], position[[0, 10, 20]], quaternion[[0, 10, 20]])
-    task = read_task(directory, _TASK.format(*(c.tolist() for c in CONTACTS), goals=goals) + more)
+    task = read_task(directory, _TASK.format(*places, shape=shape, goals=goals) + more)
     hand, angles, points = _grasp(task)
     turn = Rotation.from_quat(quaternion, scalar_first=True)
     base = Rotation.from_matrix(task.palm.rotation)

@@ -183,7 +183,7 @@ def _scene(usd: Any, source: Source) -> Any:
     place.AddOrientOp().Set(usd.Gf.Quatf(*motion.object_orientation[0].tolist()))
     if task.ground is not None:
         ground = usd.UsdGeom.Plane.Define(stage, "/World/ground")
-        size = 40 * task.object.half_extent  # only to be seen: as a collider it has no end
+        size = 40 * task.object.characteristic_length  # only to be seen: as a collider it has no end
         ground.CreateAxisAttr("Z")
         ground.CreateWidthAttr(size)
         ground.CreateLengthAttr(size)

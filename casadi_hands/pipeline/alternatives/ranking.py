@@ -126,4 +126,4 @@ def _alike(first: Design, second: Design) -> bool:
     """Whether two designs are near-duplicates; those without a hand are all the same."""
     if first.hand is None or second.hand is None:
         return first.hand is second.hand
-    return difference(first.hand, second.hand, first.task.object.half_extent) < ALIKE
+    return difference(first.hand, second.hand, first.task.object.characteristic_length) < ALIKE

@@ -92,10 +92,10 @@ def _within(report: Callable[[Progress], None], seed: int, before: float) -> Cal
         before: s that seeds before this one took.
     """
 
-    def tell(news: Progress) -> None:
+    def log(news: Progress) -> None:
         report(replace(news, text=f"seed {seed}: {news.text}", elapsed=before + news.elapsed))
 
-    return tell
+    return log
 
 
 def _broken_off(task: Task, seed: int, folder: Path | None, error: Exception) -> Design:

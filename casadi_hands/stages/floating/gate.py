@@ -64,7 +64,7 @@ def passes_gate(model: Model, values: Mapping[str, Array], pivots: bool = False)
     contacts = len(bodies)
     for k in range(len(model.schedule.keyframes)):
         points = values["point"][k].reshape(contacts, 3)
-        active = values["activity"][k] > 0.5
+        active = values["invariant"][k] > 0.5
         needed = wrenches_needed[k]
         if not active.any():
             return False

@@ -1,4 +1,4 @@
-"""Where fingers cannot follow: a contact that the object's turn would carry too far is taken anew, or held back."""
+"""Where fingers cannot follow: contacts that the object's turn would carry too far regrasp, or travel less."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from casadi_hands.problem.model import Model, Regrasp, palm_from_world
 Array = NDArray[np.float64]
 # That a contact travels around the object, seen from the palm: beyond it fingers reach around.
 FARTHEST = np.radians(100)
-HELD_WITHIN = np.radians(60)  # likewise, of contacts that cannot be taken anew: near enough for fingers to roll on
+MOST_TRAVEL = np.radians(60)  # likewise, of contacts that cannot be regrasped: near enough for fingers to roll on
 
 
 def planned_regrasp(model: Model, pose: Array) -> Regrasp | None:
     """Contacts that let go before they have travelled too far, and take the object again where they first took it.
 
-    A contact's way is the angle at the object's centre, in the palm frame, between where it touched and where the
+    A contact's travel is the angle at the object's centre, in the palm frame, between where it touched and where the
     object's turn has carried it. It lifts one keyframe before that exceeds ``FARTHEST`` and touches again at the next.
 
     Args:
@@ -40,8 +40,8 @@ def planned_regrasp(model: Model, pose: Array) -> Regrasp | None:
     return Regrasp(lifted, patches) if lifted.any() else None
 
 
-def held_back(model: Model, pose: Array) -> Regrasp:
-    """Contacts that stay within ``HELD_WITHIN`` of where they touched, while the object turns on beneath them.
+def limited_travel(model: Model, pose: Array) -> Regrasp:
+    """Contacts that stay within ``MOST_TRAVEL`` of where they touched, while the object turns on beneath them.
 
     For a turn that fingers cannot follow and during which none of them can let go: they must roll, or slide.
 
@@ -55,7 +55,7 @@ def held_back(model: Model, pose: Array) -> Regrasp:
         for k in range(1, len(turns)):
             carried = turns[k] @ patches[k - 1, c]
             patches[k, c] = patches[k - 1, c]
-            beyond = _angle(carried, taken) - HELD_WITHIN
+            beyond = _angle(carried, taken) - MOST_TRAVEL
             if beyond > 0:
                 axis = np.cross(carried, taken)
                 back = pin.exp3(beyond * axis / np.linalg.norm(axis)) @ carried

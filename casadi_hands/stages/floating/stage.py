@@ -14,14 +14,14 @@ from casadi_hands.nlp import Options, Problem, Solution, Solver
 from casadi_hands.problem.floating_motion import Floating
 from casadi_hands.problem.model import Model, sizes
 from casadi_hands.stages.floating.gate import least_squares_forces, passes_gate
-from casadi_hands.stages.floating.regrasp import held_back, planned_regrasp
+from casadi_hands.stages.floating.regrasp import limited_travel, planned_regrasp
 from casadi_hands.stages.object_motion.binding import bind_object, declare_object
 from casadi_hands.stages.object_motion.values import least_contacts, object_parameters, straight_path, term_weights
 from casadi_hands.stages.own_terms import bind_own, contact_names, own_missed
 
 Array = NDArray[np.float64]
 THRESHOLDS = (0.1, 0.2, 0.3)
-REGRASP_ROOM = 0.15  # half extents about its patches, for a contact that is taken anew
+REGRASP_ROOM = 0.15  # lengths about its patches, for a contact that is regrasped
 OPTIONS = Options(max_iter=300, tol=1e-4, acceptable_tol=1e-3)
 # An adaptive barrier is quickest, but without a bound it was seen to grow until nothing converged; a small one that
 # only shrinks is for where it still does not.
@@ -29,21 +29,21 @@ BARRIERS = (
     replace(OPTIONS, extra=(("mu_strategy", "adaptive"), ("mu_max", 0.1))),
     replace(OPTIONS, mu_init=1e-2),
 )
-# Contacts that are held back: an adaptive barrier grew and shrank there until its cap in three of eight tasks.
-HELD_BACK = (replace(OPTIONS, mu_init=1e-3), *BARRIERS)
+# Where contacts travel less: an adaptive barrier grew and shrank there until its cap in three of eight tasks.
+LIMITED_TRAVEL = (replace(OPTIONS, mu_init=1e-3), *BARRIERS)
 BROKEN = 1e-3  # violation of friction's cones: forces of zero meet them, so what leaves more has broken down
 
 
 def solve_floating(model: Model, weights: Mapping[str, float]) -> Floating:
-    """Stage 1; contacts that would travel too far around the object are taken anew if others can hold it meanwhile.
+    """Stage 1; contacts that would travel too far around the object are regrasped if others can hold it meanwhile.
 
-    Where they cannot, contacts are held back, which fingers at least can follow.
+    Where they cannot, contacts have their travel limited, which fingers at least can follow.
     """
     floating = FloatingStage(model).solve(weights)
     anew = planned_regrasp(model, floating.pose)
     if anew is None:
         return floating
-    for plan in (anew, held_back(model, floating.pose)):
+    for plan in (anew, limited_travel(model, floating.pose)):
         replanned = FloatingStage(replace(model, regrasp=plan)).solve_regrasp(floating, weights)
         if replanned is not None:
             return replanned
@@ -59,7 +59,7 @@ class FloatingStage:
         problem = Problem()
         side = declare_object(problem, model)
         bind_object(problem, model, side)
-        rows = {"pose": side.pose[1], "point": side.point[1], "force": side.force, "activity": side.activity}
+        rows = {"pose": side.pose[1], "point": side.point[1], "force": side.force, "invariant": side.invariant}
         bind_own(problem, model, "floating", contact_names(model), {}, **rows)
         self.solver = Solver(problem)
 
@@ -75,7 +75,7 @@ class FloatingStage:
             "pose": pose,
             "point": model.keyframe_patches.reshape(keyframes, -1),
             "force": force.reshape(samples, -1),
-            "activity": np.full((keyframes, contacts), 0.9),
+            "invariant": np.full((keyframes, contacts), 0.9),
         }
         for scenario in model.scenarios[1:]:
             start[f"force{scenario.suffix}"] = start["force"]
@@ -91,14 +91,14 @@ class FloatingStage:
         free = self._solved(self.start(), parameters)
         runs = [("free", free)]
         best: tuple[float, float, Solution] | None = None
-        for flags, threshold in self._candidates(free.values["activity"]):
+        for flags, threshold in self._candidates(free.values["invariant"]):
             solution = self._with_flags(flags, free.values, parameters)
             runs.append((f"threshold {threshold}", solution))
             better = solution.objective < (np.inf if best is None else best[1])
             if better and passes_gate(self.model, solution.values) and not own_missed(solution):
                 best = (threshold, solution.objective, solution)
         if best is None:
-            solution = self._with_flags(np.ones_like(free.values["activity"]), free.values, parameters)
+            solution = self._with_flags(np.ones_like(free.values["invariant"]), free.values, parameters)
             best = (0.0, solution.objective, solution)
             runs.append(("all active", solution))
         threshold, _, chosen = best
@@ -107,8 +107,8 @@ class FloatingStage:
             pose=values["pose"],
             point=values["point"].reshape(-1, contacts, 3),
             force=values["force"].reshape(-1, contacts, 3),
-            active=values["activity"] > 0.5,
-            activity=free.values["activity"],
+            active=values["invariant"] > 0.5,
+            invariant=free.values["invariant"],
             threshold=threshold,
             solution=chosen,
             runs=tuple(runs),
@@ -124,13 +124,15 @@ class FloatingStage:
         flags = (before.active & ~self.model.regrasp.lifted).astype(float)
         if flags.sum(axis=1).min() < least_contacts(self.model):
             return None
-        fixed = {"activity": flags}
+        fixed = {"invariant": flags}
         # Free, a contact that is to touch elsewhere would touch near where it was and slide there.
         patches = self.model.keyframe_patches
         moved = np.any(patches != patches[0], axis=(0, 2))
         room = np.where(moved, REGRASP_ROOM, np.inf)[None, :, None]
         lower, upper = ({**fixed, "point": (patches + side * room).reshape(keyframes, -1)} for side in (-1, 1))
-        what, barriers = ("regrasp", BARRIERS) if self.model.regrasp.lifted.any() else ("held back", HELD_BACK)
+        what, barriers = (
+            ("regrasp", BARRIERS) if self.model.regrasp.lifted.any() else ("limited contact travel", LIMITED_TRAVEL)
+        )
         solution = self._solved({**start, **fixed}, parameters, lower, upper, barriers)
         if not passes_gate(self.model, solution.values, pivots=True):
             return None
@@ -175,13 +177,13 @@ class FloatingStage:
             model=self.model,
         )
 
-    def _candidates(self, activity: Array) -> list[tuple[Array, float]]:
+    def _candidates(self, invariant: Array) -> list[tuple[Array, float]]:
         """Distinct flags (N, C) of the thresholds; a keyframe left with too few contacts keeps its strongest."""
         candidates: list[tuple[Array, float]] = []
         least = least_contacts(self.model)
         for threshold in THRESHOLDS:
-            flags = activity > threshold
-            for row, strengths in zip(flags, activity, strict=True):
+            flags = invariant > threshold
+            for row, strengths in zip(flags, invariant, strict=True):
                 row[np.argsort(-strengths, kind="stable")[:least]] = True
             if not any(np.array_equal(flags, other) for other, _ in candidates):
                 candidates.append((flags.astype(float), threshold))
@@ -190,5 +192,5 @@ class FloatingStage:
     def _with_flags(
         self, flags: Array, start: Mapping[str, ArrayLike], parameters: Mapping[str, Array | float]
     ) -> Solution:
-        fixed = {"activity": flags}
+        fixed = {"invariant": flags}
         return self._solved({**start, **fixed}, parameters, fixed, fixed)

@@ -24,17 +24,17 @@ class ObjectSide:
         pose: (S, 6) at time offsets of -1, 0 and +1 steps.
         point: (S, 3C) contact points at the same offsets, object frame.
         forces: of each scenario (S, 3C) in the object's frame, at every sample a variable of its own.
-        activity: (S, C) contact invariants, held from each keyframe to the next.
+        invariant: (S, C) contact invariants, held from each keyframe to the next.
         keyframe_pose: (N, 6).
-        keyframe_activity: (N, C).
+        keyframe_invariant: (N, C).
     """
 
     pose: tuple[Rows, Rows, Rows]
     point: tuple[Rows, Rows, Rows]
     forces: tuple[Rows, ...]
-    activity: Rows
+    invariant: Rows
     keyframe_pose: Rows
-    keyframe_activity: Rows
+    keyframe_invariant: Rows
 
     @property
     def force(self) -> Rows:
@@ -43,13 +43,13 @@ class ObjectSide:
 
 
 def declare_object(problem: Problem, model: Model) -> ObjectSide:
-    """Declare ``pose`` (N, 6), ``point`` (N, 3C), ``force`` (S, 3C), ``activity`` (N, C), and other scenarios' forces."""
+    """Declare ``pose`` (N, 6), ``point`` (N, 3C), ``invariant`` (N, C), and each scenario's ``force`` (S, 3C)."""
     schedule = model.schedule
     keyframes, samples, contacts = sizes(model)
     pose = problem.variable("pose", (keyframes, 6), *pose_bounds(model))
     point = problem.variable("point", (keyframes, 3 * contacts))
     force = problem.variable("force", (samples, 3 * contacts), -MOST_FORCE, MOST_FORCE)
-    activity = problem.variable("activity", (keyframes, contacts), 0, 1)
+    invariant = problem.variable("invariant", (keyframes, contacts), 0, 1)
     disturbed = [
         problem.variable(f"force{each.suffix}", (samples, 3 * contacts), -MOST_FORCE, MOST_FORCE, quantity="force")
         for each in model.scenarios[1:]
@@ -62,9 +62,9 @@ def declare_object(problem: Problem, model: Model) -> ObjectSide:
         pose=(poses(-1), poses(0), poses(1)),
         point=(_points(model, point, -1), _points(model, point, 0), _points(model, point, 1)),
         forces=(force, *disturbed),
-        activity=activity.take(schedule.sample_keyframes),
+        invariant=invariant.take(schedule.sample_keyframes),
         keyframe_pose=pose,
-        keyframe_activity=activity,
+        keyframe_invariant=invariant,
     )
 
 
@@ -110,7 +110,7 @@ def _bind_scenario(problem: Problem, model: Model, side: ObjectSide, force: Rows
         pose=side.pose,
         points=side.point[1],
         forces=force,
-        activity=side.activity,
+        invariant=side.invariant,
         **problem.given("reference", "step", "gravity", "inertia", "inertial"),
         **external,
     )
@@ -120,7 +120,7 @@ def _bind_scenario(problem: Problem, model: Model, side: ObjectSide, force: Rows
             {"in_cone": (0, np.inf)},
             f"contact{i}{suffix}",
             force=force.entries(3 * i, 3 * i + 3, i),
-            activity=side.activity.entries(i, i + 1, i),
+            invariant=side.invariant.entries(i, i + 1, i),
             point=side.point[1].entries(3 * i, 3 * i + 3, i),
             point_before=side.point[0].entries(3 * i, 3 * i + 3, i),
             body=problem.parameter(f"body{i}{suffix}", (1, body.width), quantity="body", owner=i),
@@ -135,7 +135,7 @@ def _bind_scenario(problem: Problem, model: Model, side: ObjectSide, force: Rows
             pose_before=side.pose[0],
             point=side.point[1].entries(3 * i, 3 * i + 3, i),
             force=force.entries(3 * i, 3 * i + 3, i),
-            activity=side.activity.entries(i, i + 1, i),
+            invariant=side.invariant.entries(i, i + 1, i),
             body=problem.parameter(f"ground_body{suffix}", (1, body.width), quantity="body", owner=i),
             friction=problem.parameter(f"ground_friction{suffix}", (1, 1), quantity="friction", owner=i),
             **problem.given("reference", "ground_height", "sharpness", "step"),
@@ -151,7 +151,7 @@ def _bind_points(problem: Problem, model: Model, side: ObjectSide) -> None:
         kernel = kernels.contact_motion()
         problem.bind(kernel, point=points, patch=patches.entries(*span), step=problem["step"])
     least = least_contacts(model), np.inf
-    problem.bind(kernels.enough_contacts(contacts), {"sum": least}, activity=side.keyframe_activity)
+    problem.bind(kernels.enough_contacts(contacts), {"sum": least}, invariant=side.keyframe_invariant)
 
 
 def _bind_goals(problem: Problem, model: Model, side: ObjectSide) -> None:

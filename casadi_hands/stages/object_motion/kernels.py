@@ -33,7 +33,7 @@ def dynamics(contacts: int, suffix: str = "", regularise: bool = True) -> Kernel
     poses = [kernel.variable(f"pose{i}", 6, "pose", i) for i in range(3)]
     points = ca.reshape(kernel.variable("points", 3 * contacts, "point"), 3, contacts)
     forces = ca.reshape(kernel.variable("forces", 3 * contacts, "force"), 3, contacts)
-    activity = kernel.variable("activity", contacts)
+    invariant = kernel.variable("invariant", contacts)
     reference, step = kernel.parameter("reference", 4), kernel.parameter("step")
     gravity = kernel.parameter("gravity", 3)
     external, external_torque = kernel.parameter("external_force", 3), kernel.parameter("external_torque", 3)
@@ -45,13 +45,13 @@ def dynamics(contacts: int, suffix: str = "", regularise: bool = True) -> Kernel
     inertial_torque = inertial * motion_terms.gyroscopic(inertia, omega, alpha)
     kernel.cost(
         motion_terms.LINEAR_MOMENTUM,
-        motion_terms.linear_momentum(ca.mtimes(rotation, forces), activity, gravity, external, acceleration, inertial),
+        motion_terms.linear_momentum(ca.mtimes(rotation, forces), invariant, gravity, external, acceleration, inertial),
         suffix,
     )
     local_torque = ca.mtimes(rotation.T, external_torque)
     kernel.cost(
         motion_terms.ANGULAR_MOMENTUM,
-        motion_terms.angular_momentum(points, forces, activity, local_torque, inertial_torque),
+        motion_terms.angular_momentum(points, forces, invariant, local_torque, inertial_torque),
         suffix,
     )
     if regularise:
@@ -67,22 +67,22 @@ def contact_forces(kind: type[Body], suffix: str = "") -> Kernel:
     Friction is also a constraint: the exponential of eq. 2.8 alone lets forces out of the cone by 0.1 m·g.
     """
     kernel = Kernel("contact" + suffix)
-    force, activity = kernel.variable("force", 3), kernel.variable("activity", 1)
+    force, invariant = kernel.variable("force", 3), kernel.variable("invariant", 1)
     point = kernel.variable("point", 3, place=0)
     before = kernel.variable("point_before", 3, "point", -1)
     body = kind.surface(kernel.parameter("body", kind.width))
     friction, sharpness, step = (kernel.parameter(name) for name in ("friction", "sharpness", "step"))
     projection, normal, _ = body.project(point)
     projection_before, _, _ = body.project(before)
-    kernel.cost(contact.FORCE_REGULARISATION, activity * force, suffix)
+    kernel.cost(contact.FORCE_REGULARISATION, invariant * force, suffix)
     kernel.cost(contact.RAW_FORCE, force, suffix)
     cone = contact.friction_cone(force, -normal, friction, sharpness)
-    kernel.cost(contact.FRICTION_CONE, activity * cone, suffix)
+    kernel.cost(contact.FRICTION_CONE, invariant * cone, suffix)
     kernel.constrain(limits.IN_CONE, contact.cone_margin(force, -normal, friction))
-    kernel.cost(contact.CONTACT_ON_OBJECT, contact.off_surface(force, activity, point, projection), suffix)
+    kernel.cost(contact.CONTACT_ON_OBJECT, contact.off_surface(force, invariant, point, projection), suffix)
     gaps = (projection - point, projection_before - before)
-    kernel.cost(contact.SLIP_ON_OBJECT, contact.gap_rate(force, activity, *gaps, step), suffix)
-    kernel.cost(contact.TANGENTIAL_SLIP, contact.slip(force, activity, point, before, step), suffix)
+    kernel.cost(contact.SLIP_ON_OBJECT, contact.gap_rate(force, invariant, *gaps, step), suffix)
+    kernel.cost(contact.TANGENTIAL_SLIP, contact.slip(force, invariant, point, before, step), suffix)
     return kernel
 
 
@@ -102,7 +102,7 @@ def ground_contact(kind: type[Body], suffix: str = "") -> Kernel:
     """The contact of object and ground at one sample (section 3.1); its normal is the world's z."""
     kernel = Kernel("ground" + suffix)
     pose, pose_before = kernel.variable("pose", 6, place=0), kernel.variable("pose_before", 6, "pose", -1)
-    point, force, activity = kernel.variable("point", 3), kernel.variable("force", 3), kernel.variable("activity", 1)
+    point, force, invariant = kernel.variable("point", 3), kernel.variable("force", 3), kernel.variable("invariant", 1)
     reference, body = kernel.parameter("reference", 4), kind.surface(kernel.parameter("body", kind.width))
     height = kernel.parameter("ground_height")
     friction, sharpness, step = (kernel.parameter(n) for n in ("friction", "sharpness", "step"))
@@ -112,18 +112,18 @@ def ground_contact(kind: type[Body], suffix: str = "") -> Kernel:
     in_world = position + ca.mtimes(rotation, point)
     in_world_before = position_before + ca.mtimes(rotation_matrix(quaternion_before), point)
     projection, normal, _ = body.project(point)
-    kernel.cost(contact.FORCE_REGULARISATION, activity * force, suffix)
+    kernel.cost(contact.FORCE_REGULARISATION, invariant * force, suffix)
     kernel.cost(contact.RAW_FORCE, force, suffix)
     upward_in_object = rotation.T[:, 2]
     cone = contact.friction_cone(force, upward_in_object, friction, sharpness)
-    kernel.cost(contact.GROUND_FRICTION_CONE, activity * cone, suffix)
+    kernel.cost(contact.GROUND_FRICTION_CONE, invariant * cone, suffix)
     kernel.constrain(limits.IN_CONE, contact.cone_margin(force, upward_in_object, friction))
-    off = contact.off_surface(force, activity, point, projection)
+    off = contact.off_surface(force, invariant, point, projection)
     kernel.cost(contact.CONTACT_ON_OBJECT, off, suffix)
-    above = contact.off_surface(force, activity, in_world[2], height)
-    tilted = contact.off_surface(force, activity, normal, -upward_in_object)
+    above = contact.off_surface(force, invariant, in_world[2], height)
+    tilted = contact.off_surface(force, invariant, normal, -upward_in_object)
     kernel.cost(contact.CONTACT_ON_GROUND, above + 0.1 * tilted, suffix)
-    kernel.cost(contact.SLIP_ON_GROUND, contact.slip(force, activity, in_world, in_world_before, step), suffix)
+    kernel.cost(contact.SLIP_ON_GROUND, contact.slip(force, invariant, in_world, in_world_before, step), suffix)
     return kernel
 
 
@@ -188,6 +188,6 @@ def palm_clearance(kind: type[Body], moves: bool) -> Kernel:
 def enough_contacts(contacts: int) -> Kernel:
     """The sum of the contact invariants at one keyframe, to be bounded below."""
     kernel = Kernel("enough_contacts")
-    activity = kernel.variable("activity", contacts)
-    kernel.constrain(limits.ENOUGH_CONTACTS, ca.sum1(activity))
+    invariant = kernel.variable("invariant", contacts)
+    kernel.constrain(limits.ENOUGH_CONTACTS, ca.sum1(invariant))
     return kernel

@@ -7,15 +7,15 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from casadi_hands.motion import eased, linear
+from casadi_hands.motion import linear, time_scaled
 from casadi_hands.nlp import Problem
 from casadi_hands.problem.model import Model, sizes
 from casadi_hands.problem.palm_motion import carried_along, carried_by_palm, goals_seen_from_palm
 from casadi_hands.stages.own_terms import own_values
 
 Array = NDArray[np.float64]
-CLEARANCE = 0.02  # half extents, asked of object and palm, and in exact motions of all bodies that do not touch
-GOAL_TOLERANCE = 5e-4  # half extents and rad, each coordinate: the task's cost alone gives way to slow accelerations
+CLEARANCE = 0.02  # lengths, asked of object and palm, and in exact motions of all bodies that do not touch
+GOAL_TOLERANCE = 5e-4  # lengths and rad, each coordinate: the task's cost alone gives way to slow accelerations
 MOST_FORCE = 20.0  # m·g, a bound on each component of a contact force
 MOST_TURN = 5.6  # rad, up to where the exponential map's coordinates are used
 
@@ -34,7 +34,7 @@ def _between_goals(model: Model, times: Array) -> Array:
     """Weights (T, G) of the goals on the straight way between them; a drawing slows down at its corners."""
     goals = model.schedule.keyframes[list(model.schedule.goals)]
     if model.tool is not None:
-        times = eased(goals, times)
+        times = time_scaled(goals, times)
     return linear(goals, times)
 
 

@@ -1,9 +1,9 @@
-"""Ways to an exact motion: on few knots before many, and where fingers must roll far, a part of the way before all.
+"""Continuation to an exact motion: on few knots before many, and where fingers must roll far, by a homotopy.
 
 An exact motion on few knots is near the one on twice as many, and costs half as much or less: it is looked for on
 sparse knots and made exact on ever denser ones. Where contacts cannot go with the object, its whole motion is too far
-from anything a hand can do for a solver to find its way; a shorter one is not, and exact motions over more and more of
-the way lead from there to the goals.
+from anything a hand can do for a solver to get there. A homotopy parameter scales the motion from its first goal, 0, to
+all of it, 1: exact motions for larger and larger parameters lead to the goals.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from casadi_hands.motion import held
+from casadi_hands.motion import zero_order_hold
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.resampling import at_rest, extrapolated, on_palm, resampled, resampled_model
 from casadi_hands.stages.refine.result import Refined, Run
-from casadi_hands.stages.refine.settings import FIRM_SOLVE, LAST, LONG_WAY, RENEWED, SHORT_WAY, Step
+from casadi_hands.stages.refine.settings import ALL_STEPS, LAST_STEP, NEARBY_STEPS, RENEWED_STEPS, STIFF_PENALTY, Step
 from casadi_hands.stages.refine.stage import RefineStage
 from casadi_hands.stages.refine.values import Margin
 
 SPARSE, COARSE = 0.4, 0.2  # s between knots, at most
-SERVES = 0.1  # cost of slip and of forces that no joint supplies, of a start that is nearly exact
-SHORTEST = 0.05  # of the way, by which a motion is lengthened at least
-LEAST = 0.1  # of the way, over which a first exact motion is looked for
+NEARLY_EXACT = 0.1  # cost of slip and of forces that no joint supplies, of a start that is nearly exact
+LEAST_STEP = 0.05  # of the homotopy parameter
+LEAST = 0.1  # homotopy parameter for which a first exact motion is looked for
 
 
 class Continuation:
@@ -65,8 +65,12 @@ class Continuation:
         model = resampled_model(self.model, self.model.schedule.stepped(step))
         if len(model.schedule.samples) >= len(finer.model.schedule.samples):
             return finer
-        active = self.active[held(self.model.schedule.samples, model.schedule.samples)]
+        active = self.active[zero_order_hold(self.model.schedule.samples, model.schedule.samples)]
         return RefineStage(model, self.contacts, self.joints, active)
+
+    def begin(self, start: WholeHand, margin: Margin, homotopy: float = 1.0) -> Refined:
+        """What a refinement from afar tries first: all steps on the sparsest knots."""
+        return self.sparse.take(ALL_STEPS, self._at(self.sparse, start), margin, homotopy)
 
     def solve(self, start: WholeHand, margin: Margin, near: bool = False) -> Refined:
         """Refine a motion.
@@ -77,15 +81,17 @@ class Continuation:
             near: whether the motion is nearly exact already, and the hand shall stay nearly what it is: then shorter
                 ways are tried first.
         """
-        ways: list[tuple[Step, ...]] = [LONG_WAY]
+        sequences: list[tuple[Step, ...]] = [ALL_STEPS]
         if near:
-            ways.insert(0, SHORT_WAY)
-            costs = self.fine.costs(SHORT_WAY[0], start, margin)
-            if costs.get("slip", 0.0) + costs.get("passive_force", 0.0) < SERVES:
-                ways.insert(0, LAST)
+            sequences.insert(0, NEARBY_STEPS)
+            costs = self.fine.costs(NEARBY_STEPS[0], start, margin)
+            if costs.get("slip", 0.0) + costs.get("passive_force", 0.0) < NEARLY_EXACT:
+                sequences.insert(0, LAST_STEP)
         return _until_met(
-            partial(self.fine.take, way, start, margin) if way == LAST else partial(self._on_few, way, start, margin)
-            for way in ways
+            partial(self.fine.take, steps, start, margin)
+            if steps == LAST_STEP
+            else partial(self._on_few, steps, start, margin)
+            for steps in sequences
         )
 
     def renew(self, start: WholeHand, margin: Margin) -> Refined:
@@ -95,33 +101,33 @@ class Continuation:
             start: the motion, at the task's samples.
             margin: to keep to the limits.
         """
-        return _until_met(partial(self.fine.take, way, start, margin) for way in (RENEWED, LAST))
+        return _until_met(partial(self.fine.take, steps, start, margin) for steps in (RENEWED_STEPS, LAST_STEP))
 
-    def regrip(self, exact: Refined, margin: Margin) -> Refined:
+    def with_margin(self, exact: Refined, margin: Margin) -> Refined:
         """Refine a motion that is exact with another margin.
 
         Args:
             exact: the motion, at the task's samples.
             margin: to keep to the limits.
         """
-        return self._on_few(SHORT_WAY, self._gripped(exact, margin), margin)
+        return self._on_few(NEARBY_STEPS, self._pressing(exact, margin), margin)
 
-    def lengthen(self, start: WholeHand, share: float, margin: Margin, firmer: Margin | None = None) -> Refined:
-        """Refine a motion over a share of the way to its goals, and lengthen it until it reaches them.
+    def continue_from(self, start: WholeHand, homotopy: float, margin: Margin, larger: Margin | None = None) -> Refined:
+        """Refine a motion for a homotopy parameter, and continue from there until it reaches its goals.
 
         Args:
-            start: the motion over this share of the way.
-            share: of the way.
+            start: the motion to this homotopy parameter.
+            homotopy: the parameter: 0 where the object stays at its first goal, 1 where it reaches all of them.
             margin: to keep to the limits.
-            firmer: a larger one, kept where an exact motion with it is found near the one without.
+            larger: a larger one, kept where an exact motion with it is found near the one without.
 
         Returns:
-            The motion over the whole way, or the longest exact one that was found.
+            The whole motion, or the exact one for the largest parameter that was found.
         """
-        stage, found = self._found(partial(self._lengthened, start, share, margin))
-        if firmer is not None and found.exact:
-            tight = self._named(stage, stage.take(SHORT_WAY, self._gripped(found, firmer), firmer))
-            tight = _after("firmer grip,", self._denser(stage, tight, start, firmer))
+        stage, found = self._found(partial(self._continued, start, homotopy, margin))
+        if larger is not None and found.exact:
+            tight = self._named(stage, stage.take(NEARBY_STEPS, self._pressing(found, larger), larger))
+            tight = _after("larger grip,", self._denser(stage, tight, start, larger))
             found = replace(found, runs=found.runs + tight.runs)
             if tight.exact:
                 return replace(tight, runs=found.runs)
@@ -131,15 +137,15 @@ class Continuation:
         """Whether fingers of a motion at the task's samples pass through each other between these."""
         return self.fine.passes_through(refined)
 
-    def _gripped(self, exact: Refined, margin: Margin) -> WholeHand:
+    def _pressing(self, exact: Refined, margin: Margin) -> WholeHand:
         """A motion with its fingers' forces as much larger as another margin asks for: a start that presses enough."""
         force = exact.hand.force.copy()
         force[:, list(self.contacts)] *= max(1.0, margin.normal_force / exact.margin.normal_force)
         return replace(exact.hand, force=force)
 
-    def _on_few(self, way: tuple[Step, ...], start: WholeHand, margin: Margin) -> Refined:
+    def _on_few(self, steps: tuple[Step, ...], start: WholeHand, margin: Margin) -> Refined:
         """A motion solved on few knots and made exact at the task's samples, near the same motion all the while."""
-        stage, found = self._found(lambda stage: stage.take_clear(way, self._at(stage, start), margin))
+        stage, found = self._found(lambda stage: stage.take_clear(steps, self._at(stage, start), margin))
         return self._denser(stage, found, start, margin, wanted=start)
 
     def _found(self, find: Callable[[RefineStage], Refined]) -> tuple[RefineStage, Refined]:
@@ -149,7 +155,7 @@ class Continuation:
         more knots does, too. A hand that leaves the object one way to go at most is not worth a second try.
         """
         stage, found = self.sparse, self._named(self.sparse, find(self.sparse))
-        surely_slips = found.slips_hopelessly and found.worst.violation <= FIRM_SOLVE.constr_viol_tol
+        surely_slips = found.slips_hopelessly and found.worst.violation <= STIFF_PENALTY.constr_viol_tol
         if found.exact or surely_slips or self.coarse is self.sparse or self._mobility < 2:
             return stage, found
         again = self._named(self.coarse, find(self.coarse))
@@ -164,27 +170,27 @@ class Continuation:
         touching = self.active[:, list(self.contacts)]
         return int(6 + (touching @ (np.array(self.joints, int) - 3)).min())
 
-    def _lengthened(self, start: WholeHand, share: float, margin: Margin, stage: RefineStage) -> Refined:
+    def _continued(self, start: WholeHand, homotopy: float, margin: Margin, stage: RefineStage) -> Refined:
         """The longest motion found on the knots of a stage."""
         model, begun = stage.model, self._at(stage, start)
         still = at_rest(model, begun)
-        refined = _after(f"{share:.0%} of the way,", stage.take(LONG_WAY, begun, margin, share))
+        refined = _after(f"homotopy {homotopy:.0%},", stage.take(ALL_STEPS, begun, margin, homotopy))
         runs = refined.runs
-        while not refined.met and share / 2 >= LEAST:
-            share, begun = share / 2, extrapolated(model, still, begun, -0.5)
-            refined = _after(f"{share:.0%} of the way,", stage.take(LONG_WAY, begun, margin, share))
+        while not refined.met and homotopy / 2 >= LEAST:
+            homotopy, begun = homotopy / 2, extrapolated(model, still, begun, -0.5)
+            refined = _after(f"homotopy {homotopy:.0%},", stage.take(ALL_STEPS, begun, margin, homotopy))
             runs += refined.runs
-        longest, before, step = refined, at_rest(model, refined.hand), max((1 - share) / 3, SHORTEST)
-        before_share, barely_rolls = 0.0, refined.barely_rolls
-        while longest.met and longest.share < 1 and step >= SHORTEST:
-            share = longest.share + step
-            share = 1.0 if share > 1 - SHORTEST / 2 else share
-            by = (share - longest.share) / (longest.share - before_share)
+        longest, before, step = refined, at_rest(model, refined.hand), max((1 - homotopy) / 3, LEAST_STEP)
+        before_homotopy, barely_rolls = 0.0, refined.barely_rolls
+        while longest.met and longest.homotopy < 1 and step >= LEAST_STEP:
+            homotopy = longest.homotopy + step
+            homotopy = 1.0 if homotopy > 1 - LEAST_STEP / 2 else homotopy
+            by = (homotopy - longest.homotopy) / (longest.homotopy - before_homotopy)
             farther = extrapolated(model, before, longest.hand, by)
-            refined = _after(f"{share:.0%} of the way,", stage.take(SHORT_WAY, farther, margin, share))
+            refined = _after(f"homotopy {homotopy:.0%},", stage.take(NEARBY_STEPS, farther, margin, homotopy))
             runs += refined.runs
             if refined.met:
-                before, before_share, longest = longest.hand, longest.share, refined
+                before, before_homotopy, longest = longest.hand, longest.homotopy, refined
             else:
                 step /= 2
         return replace(longest, runs=runs, barely_rolls=barely_rolls)
@@ -213,9 +219,9 @@ class Continuation:
             if not before.met:
                 continue
             take = denser.take if wanted is None else denser.take_clear
-            found, runs = take(RENEWED, hand, margin, before.share, near), before.runs
+            found, runs = take(RENEWED_STEPS, hand, margin, before.homotopy, near), before.runs
             if not found.met:
-                again = denser.take(SHORT_WAY, hand, margin, before.share, near)
+                again = denser.take(NEARBY_STEPS, hand, margin, before.homotopy, near)
                 better = again if again.misses_less_than(found) else found
                 found = replace(better, runs=found.runs + again.runs)
             found = self._named(denser, found)
@@ -233,11 +239,11 @@ class Continuation:
         return _after("coarse" if stage is self.coarse else "sparse", refined)
 
 
-def _until_met(ways: Iterable[Callable[[], Refined]]) -> Refined:
-    """What the first way gives that leads to an exact motion, or the last one, with the solves of all."""
+def _until_met(attempts: Iterable[Callable[[], Refined]]) -> Refined:
+    """What the first attempt gives that leads to an exact motion, or the last one, with the solves of all."""
     runs: tuple[Run, ...] = ()
-    for way in ways:
-        refined = way()
+    for attempt in attempts:
+        refined = attempt()
         runs += refined.runs
         if refined.met:
             break

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from casadi_hands.geometry.bodies import width_of
-from casadi_hands.kinematics.singularity import SIZES
+from casadi_hands.kinematics.singularity import MARGIN_SIZES
 from casadi_hands.nlp import Kernel, Parameter, Problem, Rows
 from casadi_hands.nlp.arguments import Argument
 from casadi_hands.problem.model import Model
@@ -108,8 +108,8 @@ class Declaration:
         for c, n in zip(structure.contacts, structure.joints, strict=True):
             self._own("helper", c, (count, 3))
             self._own("tie", c, (1, 1))
-            if n in SIZES:
-                self._own("branch", c, (count, SIZES[n]))
+            if n in MARGIN_SIZES:
+                self._own("margin_direction", c, (count, MARGIN_SIZES[n]))
             for name, width in (("frames", 9 * n), ("wanted_base", 2), ("wanted_lengths", n), ("wanted_axes", 2 * n)):
                 self._own(name, c, (1, width))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from casadi_hands.kinematics.singularity import SIZES
+from casadi_hands.kinematics.singularity import MARGIN_SIZES
 from casadi_hands.nlp import Parameter, Rows
 from casadi_hands.stages.object_motion.values import CLEARANCE
 from casadi_hands.stages.refine import finger_kernels as kernels
@@ -18,14 +18,14 @@ def bind_contact(of: Declaration, i: int) -> None:
     kind = type(structure.model.touched[c])
     point, force = (rows.entries(3 * i, 3 * i + 3, c) for rows in (of.point, of.force))
     # The torque is bound only where the task limits it.
-    actuated = {**IN_CONE, "passive": FREE, "torque": (-torque, torque)}
+    actuated = {**IN_CONE, "structural": FREE, "torque": (-torque, torque)}
     limited = bool(np.isfinite(torque))
     touching = np.flatnonzero(structure.touching[:, i])
-    names = ("frames", "tie", "wanted_point", "wanted_force", *(["branch"] if n in SIZES else []))
+    names = ("frames", "tie", "wanted_point", "wanted_force", *(["margin_direction"] if n in MARGIN_SIZES else []))
     of.bind(
         touching,
         kernels.contact(n, kind, limited),
-        {"on_object": (0.0, 0.0), "on_link": (0.0, 0.0), "regular": FREE, **actuated},
+        {"on_object": (0.0, 0.0), "on_link": (0.0, 0.0), "singularity_margin": FREE, **actuated},
         (c,),
         f"contact{c}",
         **_shape(of, i, touching),
@@ -77,7 +77,7 @@ def bind_contact(of: Declaration, i: int) -> None:
     of.bind(
         start,
         kernels.actuated(n, kind),
-        {"passive": FREE},
+        {"structural": FREE},
         (c,),
         f"inter_knot{c}",
         **_shape(of, i, start),
@@ -146,7 +146,7 @@ def bind_shape(of: Declaration, i: int) -> None:
     problem.bind(kernels.joint_jerk(n), angles=four, step=of.steps(first, first + 1, first + 2))
     wanted = of.of(c, first, "wanted_base", "wanted_lengths", "wanted_axes")
     reach = (model.palm_radius - model.link_radius) ** 2
-    of.bind(None, kernels.stay(n), {"on_palm": (0, reach)}, (c,), f"stay{c}", **of.shape[i], **wanted)
+    of.bind(None, kernels.near_design(n), {"on_palm": (0, reach)}, (c,), f"near_design{c}", **of.shape[i], **wanted)
 
 
 def bind_pair(of: Declaration, i: int, j: int, guarded: bool) -> None:

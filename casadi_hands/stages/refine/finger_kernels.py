@@ -12,7 +12,7 @@ from casadi_hands.geometry import norm
 from casadi_hands.geometry.bodies import Body, Surface, surfaces, width_of
 from casadi_hands.geometry.bodies.capsule import Segment
 from casadi_hands.geometry.surface import path_between, tangents
-from casadi_hands.kinematics.singularity import SIZES, regularity
+from casadi_hands.kinematics.singularity import MARGIN_SIZES, singularity_margin
 from casadi_hands.kinematics.symbols import FingerSymbols, PlacedFinger, morphology
 from casadi_hands.motion import conjugate, derivative, rotation_matrix
 from casadi_hands.motion.pose import placed
@@ -22,8 +22,8 @@ from casadi_hands.terms import clearance, finger
 from casadi_hands.terms import constraints as limits
 from casadi_hands.terms import contact as contact_terms
 
-ROUNDING = 1e-6  # half extents, of distances where they vanish
-LEVER = 0.06  # half extents/rad: forces that need a shorter lever than about this count as not supplied
+ROUNDING = 1e-6  # lengths, of distances where they vanish
+LEAST_SINGULAR_VALUE = 0.06  # lengths/rad: forces that need a shorter lever than about this count as not supplied
 
 
 def free_morphology(kernel: Kernel, joints: int, place: int | None = None) -> FingerSymbols:
@@ -102,7 +102,7 @@ def contact(joints: int, kind: type[Body], limited: bool) -> Kernel:
     """One touching contact at one knot: on both surfaces, normals opposed, in the cone, supplied by the joints.
 
     Constraints: ``on_object`` (1), ``on_link`` (3: surface and normal, see ``Touch``), those of ``_hold`` and, of a
-    finger that has branches, ``regular`` (1: its regularity on the wanted one).
+    finger that has branches, ``regular`` (1: its singularity_margin on the wanted one).
     The cost of friction is the fourth power of the share in use.
     """
     kernel = Kernel("contact")
@@ -113,14 +113,17 @@ def contact(joints: int, kind: type[Body], limited: bool) -> Kernel:
     friction, tie = kernel.parameter("friction"), kernel.parameter("tie")
     wanted_point, wanted_force = kernel.parameter("wanted_point", 3), kernel.parameter("wanted_force", 3)
     touch = scene.touch(pose, point, angles, symbols)
-    if joints in SIZES:
+    if joints in MARGIN_SIZES:
         kernel.constrain(
-            limits.REGULAR, ca.dot(kernel.parameter("branch", SIZES[joints]), regularity(touch.placed.jacobian))
+            limits.SINGULARITY_MARGIN,
+            ca.dot(
+                kernel.parameter("margin_direction", MARGIN_SIZES[joints]), singularity_margin(touch.placed.jacobian)
+            ),
         )
     kernel.constrain(limits.ON_OBJECT, touch.off_object)
     kernel.constrain(limits.ON_LINK, touch.off_link)
-    pressing, across, passive = _hold(kernel, touch, force, friction, limited)
-    kernel.cost(finger.PASSIVE_FORCE, passive)
+    pressing, across, structural = _hold(kernel, touch, force, friction, limited)
+    kernel.cost(finger.STRUCTURAL_FORCE, structural)
     kernel.cost(contact_terms.STAY_POINT, tie * (point - wanted_point))
     kernel.cost(contact_terms.STAY_FORCE, force - wanted_force)
     kernel.cost(contact_terms.FRICTION_MARGIN, contact_terms.friction_in_use(pressing, across, friction))
@@ -136,47 +139,47 @@ def disturbed_contact(joints: int, kind: type[Body], limited: bool) -> Kernel:
     force = kernel.variable("force", 3)
     scene, friction = Scene.declare(kernel, kind), kernel.parameter("friction")
     touch = scene.touch(pose, point, angles, symbols)
-    _, _, passive = _hold(kernel, touch, force, friction, limited, disturbed=True)
-    kernel.cost(finger.PASSIVE_FORCE, passive)
+    _, _, structural = _hold(kernel, touch, force, friction, limited, disturbed=True)
+    kernel.cost(finger.STRUCTURAL_FORCE, structural)
     return kernel
 
 
 @cache
 def actuated(joints: int, kind: type[Body]) -> Kernel:
-    """A contact's force at any time: ``passive`` (3) is what no joint supplies of it."""
+    """A contact's force at any time: ``structural`` (3) is what no joint supplies of it."""
     kernel = Kernel("actuated")
     symbols = free_morphology(kernel, joints)
     pose, point, angles = kernel.variable("pose", 6), kernel.variable("point", 3), kernel.variable("angles", joints)
     force = kernel.variable("force", 3)
-    passive = _passive(Scene.declare(kernel, kind).touch(pose, point, angles, symbols), force)
-    kernel.constrain(limits.ACTUATED, passive)
-    kernel.cost(finger.PASSIVE_FORCE, passive)
+    structural = _structural(Scene.declare(kernel, kind).touch(pose, point, angles, symbols), force)
+    kernel.constrain(limits.ACTUATED, structural)
+    kernel.cost(finger.STRUCTURAL_FORCE, structural)
     return kernel
 
 
 def _hold(
     kernel: Kernel, touch: Touch, force: SX, friction: SX, limited: bool, disturbed: bool = False
 ) -> tuple[SX, SX, SX]:
-    """Constrain a contact force (3,), object frame; return its normal part, tangential square and passive part.
+    """Constrain a contact force (3,), object frame; return its normal part, tangential square and structural part.
 
-    Constraints: ``pressing`` (1: normal force), ``cone`` (1: (μ f_n)² - f_t²), ``passive`` (3: force no joint
+    Constraints: ``pressing`` (1: normal force), ``cone`` (1: (μ f_n)² - f_t²), ``structural`` (3: force no joint
     supplies), and where the task limits it ``torque`` (n).
     """
     pressing = -ca.dot(force, touch.normal)
     across = ca.sumsqr(force + pressing * touch.normal)
     kernel.constrain(limits.DISTURBED_PRESSING if disturbed else limits.PRESSING, pressing)
     kernel.constrain(limits.DISTURBED_CONE if disturbed else limits.CONE, (friction * pressing) ** 2 - across)
-    passive = _passive(touch, force)
-    kernel.constrain(limits.DISTURBED_ACTUATED if disturbed else limits.ACTUATED, passive)
+    structural = _structural(touch, force)
+    kernel.constrain(limits.DISTURBED_ACTUATED if disturbed else limits.ACTUATED, structural)
     if limited:
         torque = ca.mtimes(touch.placed.jacobian.T, ca.mtimes(touch.rotation, force))
         kernel.constrain(limits.DISTURBED_TORQUE if disturbed else limits.WITHIN_TORQUE, torque)
-    return pressing, across, passive
+    return pressing, across, structural
 
 
-def _passive(touch: Touch, force: SX) -> SX:
+def _structural(touch: Touch, force: SX) -> SX:
     """The part (3,), palm frame, of a contact force, object frame, that no joint supplies."""
-    return finger.unsupplied_force(touch.placed.jacobian, ca.mtimes(touch.rotation, force), LEVER)
+    return finger.structural_force(touch.placed.jacobian, ca.mtimes(touch.rotation, force), LEAST_SINGULAR_VALUE)
 
 
 @cache
@@ -281,9 +284,9 @@ def joint_jerk(joints: int) -> Kernel:
 
 
 @cache
-def stay(joints: int) -> Kernel:
+def near_design(joints: int) -> Kernel:
     """A finger's morphology: short, on the palm, and near what the synthesis found."""
-    kernel = Kernel("stay")
+    kernel = Kernel("near_design")
     base, lengths, axes = (
         kernel.variable("base", 2),
         kernel.variable("lengths", joints),

@@ -38,7 +38,7 @@ def rates_and_wrenches(model: Model, position: Array, vector: Array) -> tuple[Ar
     return np.hstack([path(times, 1), spins]), np.hstack([force, torque])
 
 
-def perturbations(model: Model, vector: Array) -> Array:
+def disturbance_wrenches(model: Model, vector: Array) -> Array:
     """The task's perturbing force and torque (S, 6) in the frame of an object with rotation vectors (S, 3)."""
     assert model.disturbance is not None
     both = model.disturbance.force, model.disturbance.torque

@@ -41,7 +41,7 @@ def bind_physics(of: Declaration) -> None:
         force=(of.force.take(now), of.force.take(later)),
     )
     problem.bind(kernels.force_change(columns), force=(of.force.take(now), of.force.take(later)))
-    problem.bind(kernels.stay_on_path(), pose=of.pose, wanted_pose=problem["wanted_pose"])
+    problem.bind(kernels.near_path(), pose=of.pose, wanted_pose=problem["wanted_pose"])
     if len(of.disturbed):
         for kind in ("force", "torque"):
             problem.parameter(f"external_{kind}", (len(of.disturbed), 3))

@@ -17,7 +17,7 @@ from casadi_hands.nlp import Constraint, Kernel
 from casadi_hands.terms import body, contact
 from casadi_hands.terms import constraints as limits
 
-ROUNDING = 1e-6  # half extents, of distances where they vanish
+ROUNDING = 1e-6  # lengths, of distances where they vanish
 # Gauss and Legendre's points and weights, for a step from 0 to 1.
 _GAUSS, _GAUSS_WEIGHTS = (leggauss(3)[0] + 1) / 2, leggauss(3)[1] / 2
 
@@ -172,9 +172,9 @@ def force_change(contacts: int) -> Kernel:
 
 
 @cache
-def stay_on_path() -> Kernel:
+def near_path() -> Kernel:
     """The object near the motion of the whole-hand stage at one knot."""
-    kernel = Kernel("stay_path")
+    kernel = Kernel("near_path")
     pose, wanted = kernel.variable("pose", 6), kernel.parameter("wanted_pose", 6)
     kernel.cost(body.STAY_PATH, pose - wanted)
     return kernel

@@ -15,7 +15,7 @@ from casadi_hands.nlp import Kernel, Parameter, Problem, Rows
 from casadi_hands.nlp.layout import Label
 from casadi_hands.terms.finger import PROXIMITY
 
-FORCE_SHARE = 0.1  # half extents that are as far to go as a force of one weight
+FORCE_SHARE = 0.1  # lengths that are as far to go as a force of one weight
 
 
 class Proximity:
@@ -41,7 +41,7 @@ class Proximity:
         self.idle: dict[str, ArrayLike] = {f"near.{name}": 0.0 for name in self._names}
 
     def at(self, values: Mapping[str, ArrayLike]) -> dict[str, ArrayLike]:
-        """Parameters, weights among them, with which nothing costs but the change from these values of all variables."""
+        """Parameters and weights with which nothing costs but the change from these values of all variables."""
         weights: dict[str, ArrayLike] = {f"weight.{term}": 0.0 for term in self._problem.terms}
         return weights | {"weight.anchor": 1.0} | {f"near.{name}": values[name] for name in self._names}
 

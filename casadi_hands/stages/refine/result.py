@@ -45,14 +45,14 @@ class Refined:
         hand: as the whole-hand stage's, with the design as it is now.
         met: whether every constraint is met within ``ACCEPTED``.
         worst: of the motion's constraints.
-        slips: for each contact, half extents, what the last solve left that did not forbid slip, or else the last.
+        slips: for each contact, lengths, what the last solve left that did not forbid slip, or else the last.
         slips_hopelessly: whether the firm solves were left with so much slip that no exact one was tried.
         barely_rolls: whether rolling is out of the structure's reach, or so nearly that a firmer solve had to look
             for it.
         runs: every solve.
         weights: of the terms of the motion's solve.
         margin: to keep to the limits, that the motion was solved with.
-        share: of the way to its goals that the motion goes.
+        homotopy: the parameter that the motion was continued to: 1 where it reaches its goals.
     """
 
     hand: WholeHand
@@ -64,17 +64,17 @@ class Refined:
     runs: tuple[Run, ...]
     weights: dict[str, float]
     margin: Margin
-    share: float = 1.0
+    homotopy: float = 1.0
 
     @property
     def exact(self) -> bool:
         """Whether the motion meets its constraints and goes all the way to its goals."""
-        return self.met and self.share == 1
+        return self.met and self.homotopy == 1
 
     def misses_less_than(self, other: Refined) -> bool:
         """Whether the motion is exact where the other is not, goes farther, rolls where it slips, or violates less."""
 
         def missed(refined: Refined) -> tuple[bool, float, bool, float]:
-            return not refined.met, -refined.share, refined.slips_hopelessly, refined.worst.violation
+            return not refined.met, -refined.homotopy, refined.slips_hopelessly, refined.worst.violation
 
         return missed(self) < missed(other)

@@ -11,11 +11,11 @@ _NEAR = (("nlp_scaling_method", "none"), ("bound_push", 1e-6), ("bound_frac", 1e
 _MOST = 1e7  # of a multiplier; a regular one was seen to reach a tenth of that
 # Barriers are monotone: an adaptive one was seen to leap away from good starts. Small ones stay near them, where a
 # large one first wanders to the middle of all bounds and back; too small ones crawl along every bound they meet.
-SOFT = Options(150, tol=1e-3, acceptable_tol=1e-2, mu_init=1e-3, most_multiplier=_MOST, extra=_NEAR)
-FIRM_SOLVE = replace(SOFT, constr_viol_tol=1e-6, mu_init=1e-4)
+PENALTY = Options(150, tol=1e-3, acceptable_tol=1e-2, mu_init=1e-3, most_multiplier=_MOST, extra=_NEAR)
+STIFF_PENALTY = replace(PENALTY, constr_viol_tol=1e-6, mu_init=1e-4)
 MET = 1e-8  # largest violation with which a solve may end before it is optimal, where it must be exact
-HARD = replace(
-    FIRM_SOLVE,
+HARD_CONSTRAINTS = replace(
+    STIFF_PENALTY,
     max_iter=300,
     tol=1e-4,
     acceptable_tol=1e-3,
@@ -23,26 +23,26 @@ HARD = replace(
     extra=(*_NEAR, ("acceptable_constr_viol_tol", MET)),
 )
 # From an exact motion of the same margins: a larger barrier would first push it off every bound that it rests on.
-NEARBY = replace(HARD, max_iter=40, mu_init=1e-5)
+NEARBY = replace(HARD_CONSTRAINTS, max_iter=40, mu_init=1e-5)
 # Where the best of all motions takes long to find, one that is good and nearly exact has an exact one very near it.
 _LOOSE = (("dual_inf_tol", 1e3), ("compl_inf_tol", 1e-3))
 GOOD = replace(NEARBY, max_iter=60, tol=0.3, acceptable_tol=0.3, constr_viol_tol=1e-4, extra=(*_NEAR, *_LOOSE))
-PROJECTION = replace(NEARBY, max_iter=60)
+RESTORATION = replace(NEARBY, max_iter=60)
 ACCEPTED = 1e-7  # largest violation with which a refined motion is handed on
-HOPELESS = 0.1  # half extents of slip: where firm solves leave more, rolling is out of the structure's reach
+HOPELESS = 0.1  # lengths of slip: where firm solves leave more, rolling is out of the structure's reach
 FALLING = 0.5  # of the soft solve's slip: where the firm one leaves more than hopeless, but less than this, it goes on
 WEIGHTS = {term.name: single(term.weights["refine"].default) for term in terms_of("refine")}
-FIRM = {"slip": 100.0, "passive_force": 30.0}
-FIRMER = FIRM | {"slip": 1000.0}
-EXACT = {"slip": 100.0}  # its tolerance is there for where it is needed
+STIFF = {"slip": 100.0, "passive_force": 30.0}
+STIFFER = STIFF | {"slip": 1000.0}
+HARD = {"slip": 100.0}  # its tolerance is there for where it is needed
 Step = tuple[str, dict[str, float], Options]
-LONG_WAY: tuple[Step, ...] = (
-    ("soft", WEIGHTS, SOFT),
-    ("firm", WEIGHTS | FIRM, FIRM_SOLVE),
-    ("firmer", WEIGHTS | FIRMER, FIRM_SOLVE),
-    ("exact", WEIGHTS | EXACT, HARD),
+ALL_STEPS: tuple[Step, ...] = (
+    ("penalty", WEIGHTS, PENALTY),
+    ("stiff penalty", WEIGHTS | STIFF, STIFF_PENALTY),
+    ("stiffer penalty", WEIGHTS | STIFFER, STIFF_PENALTY),
+    ("hard constraints", WEIGHTS | HARD, HARD_CONSTRAINTS),
 )
 # From an exact motion to one nearby; the first step can be left out where joints can follow and supply their forces.
-SHORT_WAY: tuple[Step, ...] = (LONG_WAY[1], LONG_WAY[-1])
-LAST: tuple[Step, ...] = SHORT_WAY[-1:]
-RENEWED: tuple[Step, ...] = (("exact", WEIGHTS | EXACT, NEARBY),)
+NEARBY_STEPS: tuple[Step, ...] = (ALL_STEPS[1], ALL_STEPS[-1])
+LAST_STEP: tuple[Step, ...] = NEARBY_STEPS[-1:]
+RENEWED_STEPS: tuple[Step, ...] = (("hard constraints", WEIGHTS | HARD, NEARBY),)

@@ -24,7 +24,7 @@ from casadi_hands.stages.own_terms import own_weights
 from casadi_hands.stages.refine.inter_knot import pass_through
 from casadi_hands.stages.refine.problem import RefineProblem
 from casadi_hands.stages.refine.result import Refined, Run, Worst
-from casadi_hands.stages.refine.settings import ACCEPTED, FALLING, GOOD, HOPELESS, MET, PROJECTION, Step
+from casadi_hands.stages.refine.settings import ACCEPTED, FALLING, GOOD, HOPELESS, MET, RESTORATION, Step
 from casadi_hands.stages.refine.values import Margin, RefineValues
 
 
@@ -57,17 +57,17 @@ class RefineStage:
 
     def take_clear(
         self,
-        way: tuple[Step, ...],
+        steps: tuple[Step, ...],
         start: WholeHand,
         margin: Margin,
-        share: float = 1.0,
+        homotopy: float = 1.0,
         wanted: WholeHand | None = None,
     ) -> Refined:
         """``take``, and where fingers pass through each other between knots again, with them kept clear there, too."""
-        refined = self.take(way, start, margin, share, wanted)
+        refined = self.take(steps, start, margin, homotopy, wanted)
         if not refined.met or not self.passes_through(refined):
             return refined
-        guarded = self._guarded.take(way, start, margin, share, wanted)
+        guarded = self._guarded.take(steps, start, margin, homotopy, wanted)
         return replace(guarded, runs=refined.runs + guarded.runs)
 
     def passes_through(self, refined: Refined) -> bool:
@@ -80,49 +80,49 @@ class RefineStage:
 
     def take(
         self,
-        way: tuple[Step, ...],
+        steps: tuple[Step, ...],
         start: WholeHand,
         margin: Margin,
-        share: float = 1.0,
+        homotopy: float = 1.0,
         wanted: WholeHand | None = None,
     ) -> Refined:
         """Solve step by step; not to the end where firm solves show rolling to be out of reach.
 
         Args:
-            way: solves, each from where the one before ended.
+            steps: solves, each from where the one before ended.
             start: the motion to begin with.
             margin: to keep to the limits.
-            share: of the way from the first goal to each of the others.
+            homotopy: the parameter: 0 where the object stays at its first goal, 1 where it reaches all of them.
             wanted: the motion, of the same hand, that costs hold near to; by default that to begin with.
         """
-        given = self.given if share == 1 else RefineValues(self.built, shortened(self.model, share))
+        given = self.given if homotopy == 1 else RefineValues(self.built, shortened(self.model, homotopy))
         values, parameters = given.start(start), given.parameters(start, margin, wanted)
         lower, upper = given.bounds()
         always, exact = given.constraint_bounds(margin)
-        branches, regular = given.regular(start)
-        parameters, always = parameters | branches, always | regular
+        directions, regular = given.singularity_margins(start)
+        parameters, always = parameters | directions, always | regular
         runs: list[Run] = []
         slips: dict[str, float] = {}
         most = 0.0
-        for what, given_weights, options in way:
+        for what, given_weights, options in steps:
             weights = given_weights | own_weights(self.model, "refine")
             most, before = max(slips.values(), default=0.0), most
-            if what == "firmer" and not HOPELESS < most < FALLING * before:
+            if what == "stiffer penalty" and not HOPELESS < most < FALLING * before:
                 continue
-            if what == "exact" and not most <= HOPELESS:  # nor where a solve broke down
+            if what == "hard constraints" and not most <= HOPELESS:  # nor where a solve broke down
                 break
-            bounds = always | exact if what == "exact" else always
+            bounds = always | exact if what == "hard constraints" else always
             parameters |= self._weighted(weights)
             solution = self.solver.solve(values, parameters, options, lower, upper, bounds)
-            if what == "exact" and not solution.violation <= MET:
-                solution = self._projected(solution, parameters, lower, upper, bounds)
+            if what == "hard constraints" and not solution.violation <= MET:
+                solution = self._restored(solution, parameters, lower, upper, bounds)
             runs.append(Run(what, solution, margin))
             values, used = solution.values, weights
-            if what != "exact":
+            if what != "hard constraints":
                 slips = self._slips(solution)
-        return replace(self._result(start, runs, slips or self._slips(solution), used), share=share)
+        return replace(self._result(start, runs, slips or self._slips(solution), used), homotopy=homotopy)
 
-    def _projected(
+    def _restored(
         self,
         solution: Solution,
         parameters: Mapping[str, ArrayLike],
@@ -136,7 +136,7 @@ class RefineStage:
         good = self.solver.solve(solution.values, parameters, GOOD, lower, upper, bounds)
         near = (good if np.isfinite(good.violation) else solution).values
         anchored = {**parameters, **self.built.proximity.at(near)}
-        nearest = self.solver.solve(near, anchored, PROJECTION, lower, upper, bounds)
+        nearest = self.solver.solve(near, anchored, RESTORATION, lower, upper, bounds)
         solves = (solution, good, nearest)
         iterations, seconds = sum(s.iterations for s in solves), sum(s.seconds for s in solves)
         if not nearest.violation < solution.violation:
@@ -194,9 +194,9 @@ class RefineStage:
             disturbed=disturbed,
         )
         worst = self._worst(solution)
-        hopeless = what != "exact"
+        hopeless = what != "hard constraints"
         met = not hopeless and worst.violation <= ACCEPTED
-        barely = hopeless or any(run.what == "firmer" for run in runs)
+        barely = hopeless or any(run.what == "stiffer penalty" for run in runs)
         return Refined(hand, met, worst, slips, hopeless, barely, tuple(runs), weights, margin)
 
     def _worst(self, solution: Solution) -> Worst:

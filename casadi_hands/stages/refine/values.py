@@ -8,19 +8,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from casadi_hands.geometry.bodies import Body, packed
-from casadi_hands.kinematics.singularity import REGULAR, SIZES, branches
+from casadi_hands.kinematics.singularity import LEAST_MARGIN, MARGIN_SIZES, margin_directions
 from casadi_hands.motion import continuous
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.placement import contact_jacobians
 from casadi_hands.stages.object_motion.values import MOST_FORCE, MOST_TURN, tool_path
 from casadi_hands.stages.own_terms import own_values
-from casadi_hands.stages.refine.initial_guess import balanced, perturbations, rates_and_wrenches
+from casadi_hands.stages.refine.initial_guess import balanced, disturbance_wrenches, rates_and_wrenches
 from casadi_hands.stages.refine.problem import RefineProblem
 
 Array = NDArray[np.float64]
-EASED = 0.5  # s over which a contact that touches or lifts comes to press with its full force, or to let go
-TOOL_TOLERANCE = 5e-3  # half extents, how far a drawing's tool may leave its path between goals
+RAMP = 0.5  # s over which a contact that touches or lifts comes to press with its full force, or to let go
+TOOL_TOLERANCE = 5e-3  # lengths, how far a drawing's tool may leave its path between goals
 LIFTING_TIE = 2.0  # of a contact to where it was planned, where it lets go in order to touch elsewhere
 SLIDING_TIE = 0.3  # of a contact to where it was planned to slide; it shall roll if it can
 ROUGHLY = 10.0  # times of what no joint may supply at knots may be so between them, where motions are interpolated
@@ -34,12 +34,12 @@ class Margin:
     Attributes:
         friction: share of μ that may be used.
         normal_force: least normal force of an active contact, m·g.
-        passive: largest component of a force that no joint supplies, m·g.
+        structural: largest component of a force that no joint supplies, m·g.
     """
 
     friction: float = 0.5
     normal_force: float = 1.0
-    passive: float = 0.0075
+    structural: float = 0.0075
 
 
 class RefineValues:
@@ -67,15 +67,15 @@ class RefineValues:
         always: Bounds = {}
         exact: Bounds = {}
         for i, c in enumerate(structure.contacts):
-            floor = margin.normal_force * eased_in(self.bearing[:, i], times)[structure.touching[:, i]]
+            floor = margin.normal_force * force_ramp(self.bearing[:, i], times)[structure.touching[:, i]]
             always[f"contact{c}.pressing"] = (floor[:, None], np.inf)
             # The point stays on the object's surface, where its force acts; the link may be a little off it.
             exact[f"contact{c}.on_link"] = (-model.gap_tolerance, model.gap_tolerance)
             slip = self._slip_allowed(i)
             exact[f"rolling{c}.no_slip"] = (-slip, slip)
             for block, factor in (("contact", 1.0), ("disturbed_contact", 1.0), ("inter_knot", ROUGHLY)):
-                if f"{block}{c}.passive" in self.problem.constraint_rows:
-                    exact[f"{block}{c}.passive"] = (-factor * margin.passive, factor * margin.passive)
+                if f"{block}{c}.structural" in self.problem.constraint_rows:
+                    exact[f"{block}{c}.structural"] = (-factor * margin.structural, factor * margin.structural)
         if structure.grounded:
             slip = self._slip_allowed(-1)
             exact["ground_rolling.no_slip"] = (-slip, slip)
@@ -85,18 +85,20 @@ class RefineValues:
             always["tool_point.on_path"] = (-tolerance, tolerance)
         return always, exact
 
-    def regular(self, motion: WholeHand) -> tuple[dict[str, ArrayLike], Bounds]:
-        """Parameters and bounds that keep each finger on the branch that a motion is on, nearly all of the time."""
+    def singularity_margins(self, motion: WholeHand) -> tuple[dict[str, ArrayLike], Bounds]:
+        """Parameters and bounds that keep each finger on its side of singular poses, where it is nearly all of the time."""
         structure = self.structure
         parameters: dict[str, ArrayLike] = {}
         bounds: Bounds = {}
         for i, (c, n) in enumerate(zip(structure.contacts, structure.joints, strict=True)):
-            if n in SIZES:
+            if n in MARGIN_SIZES:
                 touching = structure.touching[:, i]
-                branch = branches(contact_jacobians(self.model, motion, i), structure.active[:, i], touching)
-                parameters[f"branch{c}"] = branch
-                kept = np.abs(branch[touching]).sum(axis=1) > 0
-                bounds[f"contact{c}.regular"] = (np.where(kept, REGULAR, -np.inf)[:, None], np.inf)
+                direction = margin_directions(
+                    contact_jacobians(self.model, motion, i), structure.active[:, i], touching
+                )
+                parameters[f"margin_direction{c}"] = direction
+                kept = np.abs(direction[touching]).sum(axis=1) > 0
+                bounds[f"contact{c}.singularity_margin"] = (np.where(kept, LEAST_MARGIN, -np.inf)[:, None], np.inf)
         return parameters, bounds
 
     def _slip_allowed(self, column: int) -> Array:
@@ -141,7 +143,7 @@ class RefineValues:
         at, pushing = ((a[1:] + a[:-1]) / 2 for a in (points, forces))
         values["middle_torque"] = np.cross(at, pushing).sum(axis=1)
         if len(k := self.disturbed):
-            needed = wrenches[k] - perturbations(self.model, motion.vector)[k]
+            needed = wrenches[k] - disturbance_wrenches(self.model, motion.vector)[k]
             disturbed = balanced(points[k], forces[k], self._active[k], needed)
             values["force_disturbed"] = disturbed.reshape(len(k), -1)
         for c, finger, angles in zip(self.structure.contacts, motion.fingers, motion.angles, strict=True):
@@ -187,8 +189,8 @@ class RefineValues:
             values[f"wanted_point{c}"], values[f"wanted_force{c}"] = wanted.point[:, c], wanted.force[:, c]
             values[f"body{c}"] = model.touched[c].parameters
         for c, finger in zip(self.structure.contacts, wanted.fingers, strict=True):
-            if finger.joints in SIZES:
-                values[f"branch{c}"] = 0.0
+            if finger.joints in MARGIN_SIZES:
+                values[f"margin_direction{c}"] = 0.0
             values[f"frames{c}"] = finger.frames.transpose(0, 2, 1).reshape(1, -1)
             values[f"wanted_base{c}"], values[f"wanted_lengths{c}"] = finger.base, finger.lengths
             values[f"wanted_axes{c}"] = finger.axes.reshape(1, -1)
@@ -197,12 +199,12 @@ class RefineValues:
         return values
 
 
-def eased_in(bearing: NDArray[np.bool_], times: Array) -> Array:
+def force_ramp(bearing: NDArray[np.bool_], times: Array) -> Array:
     """Share (S,) of the normal force asked of a contact at times (S,): it grows after a touch, falls before a lift."""
     if bearing.all():
         return np.ones(len(bearing))
     away = np.abs(times[:, None] - times[~bearing]).min(axis=1)
-    return np.asarray(np.minimum(away / EASED, 1.0))
+    return np.asarray(np.minimum(away / RAMP, 1.0))
 
 
 def longest_run(flags: NDArray[np.bool_], lengths: Array) -> float:

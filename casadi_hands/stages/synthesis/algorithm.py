@@ -12,7 +12,7 @@ import numpy as np
 from casadi_hands.errors import SolveError
 from casadi_hands.execution.processes import run_all
 from casadi_hands.kinematics.morphology import FingerSeed
-from casadi_hands.stages.synthesis.score import THRESHOLD, finger_scores, folding, worst_miss
+from casadi_hands.stages.synthesis.score import THRESHOLD, finger_scores, singular_fingers, worst_miss
 from casadi_hands.stages.synthesis.shortcoming import Shortcoming, shortcoming
 from casadi_hands.stages.synthesis.stage import Synthesised
 from casadi_hands.stages.synthesis.target import Target
@@ -21,7 +21,7 @@ from casadi_hands.stages.synthesis.trials import combine_fingers, design_finger
 Progress = Callable[[str], None]
 # A finger that passes a singular pose counts as worse than one that does not by this, and its hand by this share:
 # where others serve about as well they are taken.
-FOLDED_FINGER, FOLDED_HAND = 0.05, 0.1
+SINGULAR_FINGER, SINGULAR_HAND = 0.05, 0.1
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Found:
 
     Attributes:
         candidates: hands of the last round, best first.
-        farthest: how far the worst of those fingers is from its contact, half extents.
+        farthest: how far the worst of those fingers is from its contact, lengths.
         short: why fingers stayed above the threshold at the most joints allowed, one finding each.
     """
 
@@ -137,13 +137,13 @@ class Search:
         for c in growing:
             self.grown[c] = joints[c]
             pool = [r for args, r in zip(work, results, strict=True) if args[1] == c]
-            scored = [(_alone(r) + FOLDED_FINGER * folding(self.target, r), r.fingers[0]) for r in pool]
+            scored = [(_alone(r) + SINGULAR_FINGER * singular_fingers(self.target, r), r.fingers[0]) for r in pool]
             self.pools[c] = sorted(scored, key=lambda pair: pair[0])
         for args, result in zip(work, results, strict=True):
             self._record(f"finger {self.names[args[1]]}, {args[2]} joints", args[3][3], result)
 
     def _recombine(self, round_key: int) -> list[Candidate]:
-        """Hands of the best fingers and of sampled ones, best first: by objective, and folding counts as worse."""
+        """Hands of the best fingers and of sampled ones, best first: by objective, where singular poses count."""
         rng = np.random.default_rng((self.seed, 1_000_003, round_key))
         chosen: list[tuple[int, ...]] = []
         for trial in range(self.recombinations):
@@ -166,7 +166,9 @@ class Search:
             self._record(f"hand of {'+'.join(str(f.joints) for f in result.fingers)} joints", trial, result)
 
         def cost(candidate: Candidate) -> float:
-            return candidate.hand.solution.objective * (1 + FOLDED_HAND * folding(self.target, candidate.hand))
+            return candidate.hand.solution.objective * (
+                1 + SINGULAR_HAND * singular_fingers(self.target, candidate.hand)
+            )
 
         return sorted(candidates, key=cost)
 

@@ -26,7 +26,7 @@ class Shortcoming:
             its joints supply too little of its force.
         contact: index of the finger's contact.
         joints: of the finger.
-        by: half extents beyond reach or missed, or the mean force that no joint supplies, m·g.
+        by: lengths beyond reach or missed, or the mean force that no joint supplies, m·g.
         time: s, when this is worst; None of a mean.
     """
 
@@ -38,7 +38,7 @@ class Shortcoming:
 
 
 def beyond_reach(target: Target, contact: int, joints: int) -> Array:
-    """How far (N,) a contact lies beyond the longest finger at each keyframe, half extents; negative within reach.
+    """How far (N,) a contact lies beyond the longest finger at each keyframe, lengths; negative within reach.
 
     The finger stands anywhere on the palm's disc, its links are as long as allowed and in one line, and the contact
     is on its tip's surface. Joint limits and what is in the way only make the true reach smaller.

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 OPTIONS = Options(max_iter=150, tol=1e-3, acceptable_tol=1e-2, mu_init=1e-3)
 BETWEEN = 2  # collision samples between neighbouring keyframes
 AXIS_RANGE = 2.2  # rad, how far an axis may turn from its seed
-MARGIN = 0.03  # clearance asked of bodies that need not touch, half extents
+MARGIN = 0.03  # clearance asked of bodies that need not touch, lengths
 LOOSE = 0.4  # how far the box bounds of angles and lengths are opened while annealing
 
 

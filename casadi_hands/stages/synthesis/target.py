@@ -44,17 +44,17 @@ class Target:
 
     @property
     def palm_radius(self) -> float:
-        """Of the disc, half extents."""
+        """Of the disc, lengths."""
         return self.model.palm_radius
 
     @property
     def link_radius(self) -> float:
-        """Of every link, half extents."""
+        """Of every link, lengths."""
         return self.model.link_radius
 
     @property
     def link_length(self) -> tuple[float, float]:
-        """Shortest and longest, half extents."""
+        """Shortest and longest, lengths."""
         return self.model.link_length
 
     @property
@@ -85,7 +85,7 @@ class Target:
         return self.model.schedule.between(between)
 
     def scene(self, times: Array) -> tuple[Array, Array, Array]:
-        """Parameters of the object's bodies (T, W), the ground's normal (T, 3) and its offset (T,) in the palm frame."""
+        """Parameters of the object's bodies (T, W), the ground's normal (T, 3) and offset (T,), palm frame."""
         model = self.model
         added = linear(model.schedule.samples, times) @ added_to_spline(model, 0)
         poses = catmull_rom(self.times, times) @ self.pose + added

@@ -30,7 +30,7 @@ def touch(joints: int, moves: bool) -> Kernel:
     """One finger and its contact at one sample (Table 2.4): all that ties the contact to the finger."""
     kernel = Kernel("touch")
     pose, pose_before = kernel.variable("pose", 6, place=0), kernel.variable("pose_before", 6, "pose", -1)
-    point, force, activity = kernel.variable("point", 3), kernel.variable("force", 3), kernel.variable("activity", 1)
+    point, force, invariant = kernel.variable("point", 3), kernel.variable("force", 3), kernel.variable("invariant", 1)
     angles = kernel.variable("angles", joints, place=0)
     angles_before = kernel.variable("angles_before", joints, "angles", -1)
     palm, palm_before = Palm(kernel, moves), Palm(kernel, moves, before=True)
@@ -47,15 +47,15 @@ def touch(joints: int, moves: bool) -> Kernel:
     link = Surface(Segment(SX.zeros(3, 1), ca.vertcat(0, 0, symbols.lengths[-1])), radius)
     projection, normal, _ = link.project(on_link)
     force_in_palm = palm.turned(ca.mtimes(rotation, force))
-    kernel.cost(contact.CONTACT_ON_FINGER, contact.off_surface(force, activity, on_link, projection))
+    kernel.cost(contact.CONTACT_ON_FINGER, contact.off_surface(force, invariant, on_link, projection))
     position_before, quaternion_before = placed(pose_before, reference)
     object_moved = in_palm - palm_before.sees(position_before + ca.mtimes(rotation_matrix(quaternion_before), point))
     finger_moved = in_palm - symbols.placed(angles_before, radius, on_link).contact
-    kernel.cost(contact.SLIP_ON_FINGER, contact.slip(force, activity, object_moved, finger_moved, step))
+    kernel.cost(contact.SLIP_ON_FINGER, contact.slip(force, invariant, object_moved, finger_moved, step))
     cone = contact.friction_cone(force_in_palm, ca.mtimes(here.tip_rotation, normal), friction, sharpness)
-    kernel.cost(contact.FRICTION_CONE_HAND, activity * cone)
-    kernel.cost(finger.NULL_SPACE, activity * finger.null_space(here.jacobian, force_in_palm))
-    kernel.cost(finger.TORQUE, activity * finger.joint_torques(here.jacobian, force_in_palm))
+    kernel.cost(contact.FRICTION_CONE_HAND, invariant * cone)
+    kernel.cost(finger.NULL_SPACE, invariant * finger.null_space(here.jacobian, force_in_palm))
+    kernel.cost(finger.TORQUE, invariant * finger.joint_torques(here.jacobian, force_in_palm))
     return kernel
 
 

@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 # The start is near what is wanted: a small barrier, and no push away from bounds, halve the iterations of a large one.
 OPTIONS = Options(mu_init=1e-3, extra=(("bound_push", 1e-4), ("bound_frac", 1e-4)))
 BROKEN = 1e-2  # violation of a solve that lost its way, from which another barrier leads elsewhere
-FARTHEST_PALM = 2.0  # half extents and rad, how far a palm that may move leaves its given motion
+FARTHEST_PALM = 2.0  # lengths and rad, how far a palm that may move leaves its given motion
 
 
 class WholeHandStage:
@@ -71,7 +71,7 @@ class WholeHandStage:
             three = [palm.take(np.clip(inner + offset, 0, keyframes - 1)) for offset in (-1, 0, 1)]
             step = problem.parameter("keyframe_step", (1, 1))
             problem.bind(kernels.palm_motion(), palm=three, keyframe_step=step)
-        rows = {"pose": side.pose[1], "point": side.point[1], "force": side.force, "activity": side.activity}
+        rows = {"pose": side.pose[1], "point": side.point[1], "force": side.force, "invariant": side.invariant}
         sampled = {c: each.combine(schedule.spline(), 0) for c, each in angles.items()}
         bind_own(problem, model, "whole_hand", contact_names(model), sampled, **rows)
         self.solver = Solver(problem)
@@ -91,7 +91,7 @@ class WholeHandStage:
             pose_before=side.pose[0],
             point=side.point[1].entries(*span),
             force=side.force.entries(*span),
-            activity=side.activity.entries(c, c + 1, c),
+            invariant=side.invariant.entries(c, c + 1, c),
             angles=now,
             angles_before=before,
             **moved,
@@ -138,7 +138,7 @@ class WholeHandStage:
             "pose": floating.pose,
             "point": self._start_points(floating, fingers).reshape(len(flags), -1),
             "force": floating.force.reshape(len(floating.force), -1),
-            "activity": flags,
+            "invariant": flags,
             **{f"angles{c}": f.angles for c, f in zip(self.contacts, fingers, strict=True)},
         }
         for scenario in model.scenarios[1:]:
@@ -146,7 +146,7 @@ class WholeHandStage:
             start[name] = floating.solution.values[name]
         bounds = pose_bounds(model)
         parameters = self._parameters(fingers) | term_weights(self.problem, model, weights)
-        lower, upper = ({"activity": flags, "pose": bound} for bound in bounds)
+        lower, upper = ({"invariant": flags, "pose": bound} for bound in bounds)
         solution = self.solver.solve(start, parameters, options, lower, upper)
         if not solution.violation <= BROKEN:
             other = replace(options, mu_init=10 * options.mu_init)

@@ -14,8 +14,8 @@ from casadi_hands.problem.model import Model, Regrasp, sampled_points
 from casadi_hands.problem.si import build_model
 from casadi_hands.stages.floating import stage as floating_stage
 from casadi_hands.stages.floating.gate import passes_gate
-from casadi_hands.stages.floating.regrasp import FARTHEST, held_back, planned_regrasp
-from casadi_hands.stages.floating.stage import BARRIERS, HELD_BACK, FloatingStage, solve_floating
+from casadi_hands.stages.floating.regrasp import FARTHEST, limited_travel, planned_regrasp
+from casadi_hands.stages.floating.stage import BARRIERS, LIMITED_TRAVEL, FloatingStage, solve_floating
 from casadi_hands.stages.object_motion.values import straight_path
 from casadi_hands.task import parse_task
 from tests.stages.example import made_up_solution
@@ -91,7 +91,7 @@ keyframes_between: 2
 def test_contacts_that_cannot_let_go_stay_behind_and_are_carried_back() -> None:
     model = ball()
     pose = straight_path(model)
-    patches = held_back(model, pose).patches
+    patches = limited_travel(model, pose).patches
     seen = np.einsum("kij,kcj->kci", Rotation.from_rotvec(pose[:, 3:]).as_matrix(), patches)
     azimuth = np.degrees(np.arctan2(seen[..., 1], seen[..., 0]))
     travelled = (azimuth - azimuth[0] + 180) % 360 - 180
@@ -124,12 +124,12 @@ def test_contacts_held_back_are_solved_with_a_small_barrier_first_and_a_regrasp_
     monkeypatch.setattr(FloatingStage, "_solved", lambda self, *given: used.append(given[-1]) or before.solution)
     monkeypatch.setattr(floating_stage, "passes_gate", lambda *_, **__: False)
     for lifted in (False, True):
-        plan = held_back(model, before.pose)
+        plan = limited_travel(model, before.pose)
         plan.lifted[3, 0] = lifted
         assert FloatingStage(replace(model, regrasp=plan)).solve_regrasp(before, parse_task_weights()) is None
-    assert used == [HELD_BACK, BARRIERS]
-    assert HELD_BACK[0].mu_init < min(barrier.mu_init for barrier in BARRIERS)
-    assert HELD_BACK[1:] == BARRIERS
+    assert used == [LIMITED_TRAVEL, BARRIERS]
+    assert LIMITED_TRAVEL[0].mu_init < min(barrier.mu_init for barrier in BARRIERS)
+    assert LIMITED_TRAVEL[1:] == BARRIERS
 
 
 def test_what_counts_is_the_way_seen_from_the_palm() -> None:
@@ -174,14 +174,14 @@ def test_two_contacts_pass_as_a_pivot_only_while_one_lifts() -> None:
     values = {
         "pose": np.tile(straight_path(model)[0], (5, 1)),
         "point": model.keyframe_patches.reshape(5, -1),
-        "activity": np.ones((5, 3)),
+        "invariant": np.ones((5, 3)),
     }
     assert passes_gate(model, values)
-    values["activity"] = values["activity"].copy()
-    values["activity"][2, 2] = 0
+    values["invariant"] = values["invariant"].copy()
+    values["invariant"][2, 2] = 0
     assert not passes_gate(model, values)
     assert passes_gate(model, values, pivots=True)
-    values["activity"][2] = 0
+    values["invariant"][2] = 0
     assert not passes_gate(model, values, pivots=True)
 
 

@@ -177,28 +177,28 @@ def stage() -> FloatingStage:
 
 
 def test_thresholds_give_distinct_flags(stage: FloatingStage) -> None:
-    activity = np.full((len(stage.model.schedule.keyframes), 3), 0.9)
-    activity[3] = [0.9, 0.8, 0.15]
-    activity[5] = [0.9, 0.8, 0.25]
-    candidates = {threshold: flags for flags, threshold in stage._candidates(activity)}
+    invariant = np.full((len(stage.model.schedule.keyframes), 3), 0.9)
+    invariant[3] = [0.9, 0.8, 0.15]
+    invariant[5] = [0.9, 0.8, 0.25]
+    candidates = {threshold: flags for flags, threshold in stage._candidates(invariant)}
     assert list(candidates) == [0.1, 0.2, 0.3]
     assert candidates[0.1].all()
     assert np.argwhere(candidates[0.2] == 0).tolist() == [[3, 2]]
     assert np.argwhere(candidates[0.3] == 0).tolist() == [[3, 2], [5, 2]]
-    assert len(stage._candidates(np.full_like(activity, 0.9))) == 1
+    assert len(stage._candidates(np.full_like(invariant, 0.9))) == 1
 
 
 def test_a_keyframe_keeps_its_two_strongest_contacts(stage: FloatingStage) -> None:
-    activity = np.full((len(stage.model.schedule.keyframes), 3), 0.9)
-    activity[2] = [0.02, 0.01, 0.05]
-    for flags, _ in stage._candidates(activity):
+    invariant = np.full((len(stage.model.schedule.keyframes), 3), 0.9)
+    invariant[2] = [0.02, 0.01, 0.05]
+    for flags, _ in stage._candidates(invariant):
         assert flags[2].tolist() == [1, 0, 1]
 
 
 def test_flags_are_fixed_by_bounds_and_the_result_passes_the_gate(turned: Solved) -> None:
     _, model, floating = turned
-    assert set(np.unique(floating.solution.values["activity"])) <= {0.0, 1.0}
-    np.testing.assert_array_equal(floating.active, floating.solution.values["activity"] == 1)
+    assert set(np.unique(floating.solution.values["invariant"])) <= {0.0, 1.0}
+    np.testing.assert_array_equal(floating.active, floating.solution.values["invariant"] == 1)
     assert passes_gate(model, floating.solution.values)
     assert floating.threshold in (0.1, 0.2, 0.3)
     assert rotations(model.reference).magnitude() < 1e-12

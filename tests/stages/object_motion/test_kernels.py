@@ -56,11 +56,11 @@ class Witness:
 
     def __init__(self, model: Model, values: dict[str, Array]) -> None:
         self.model, self.schedule = model, model.schedule
-        samples, count = len(self.schedule.samples), values["activity"].shape[1]
+        samples, count = len(self.schedule.samples), values["invariant"].shape[1]
         self.motion = Motion(model, values["pose"])
         self.pose = values["pose"]
         keyframes = np.searchsorted(self.schedule.keyframes, self.schedule.samples + 1e-9) - 1
-        self.activity = values["activity"][keyframes]
+        self.invariant = values["invariant"][keyframes]
         self.forces = {"": values["force"].reshape(samples, count, 3)}
         if model.disturbance is not None:
             self.forces["_perturbed"] = values["force_perturbed"].reshape(samples, count, 3)
@@ -136,7 +136,7 @@ class Witness:
         return float(total)
 
     def palm_clearance(self) -> float:
-        """Ends and middle of each primitive's axis against palm (0.02 half extents apart) and ground."""
+        """Ends and middle of each primitive's axis against palm (0.02 lengths apart) and ground."""
         model, total = self.model, 0.0
         positions, orientations = self.motion.at(0)
         for s, (position, turn) in enumerate(zip(positions, orientations, strict=True)):
@@ -159,7 +159,7 @@ class Witness:
         twist = model.disturbance.torque if suffix else zeros
         acceleration, torque_of_motion = self.motion.acceleration, self.motion.inertial_torque
         for s, turn in enumerate(orientations):
-            c, force, point = self.activity[s], forces[s], self.points[1][s]
+            c, force, point = self.invariant[s], forces[s], self.points[1][s]
             net = turn.apply(c @ force) + model.gravity + push[s] - model.units.inertial * acceleration[s]
             torque = c @ np.cross(point, force) + turn.inv().apply(twist[s]) - torque_of_motion[s]
             total["linear_momentum"] += net @ net
@@ -324,14 +324,14 @@ def test_derivatives_agree_with_differences(fixture: str, request: pytest.Fixtur
 
 def test_activity_is_boxed_and_a_keyframe_keeps_two_contacts(full: Case) -> None:
     problem = full.stage.solver.problem
-    lower, upper = (problem.variables.unpack(v)["activity"] for v in (problem.lower, problem.upper))
+    lower, upper = (problem.variables.unpack(v)["invariant"] for v in (problem.lower, problem.upper))
     assert (lower == 0).all()
     assert (upper == 1).all()
     rows = problem.constraint_rows["enough_contacts.sum"]
     assert set(problem.constraint_lower[rows].ravel()) == {2}
     assert set(problem.constraint_upper[rows].ravel()) == {np.inf}
     sums = full.constraints()[rows].ravel()
-    np.testing.assert_allclose(sums, full.values["activity"].sum(axis=1), atol=1e-12)
+    np.testing.assert_allclose(sums, full.values["invariant"].sum(axis=1), atol=1e-12)
 
 
 @pytest.mark.parametrize("suffix", ["", "_perturbed"])

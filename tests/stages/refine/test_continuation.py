@@ -13,9 +13,9 @@ import pytest
 
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.resampling import resampled, resampled_model
-from casadi_hands.stages.refine.continuation import SHORTEST, Continuation
+from casadi_hands.stages.refine.continuation import LEAST_STEP, Continuation
 from casadi_hands.stages.refine.result import Refined, Run, Worst
-from casadi_hands.stages.refine.settings import LONG_WAY, SHORT_WAY
+from casadi_hands.stages.refine.settings import ALL_STEPS, NEARBY_STEPS
 from casadi_hands.stages.refine.values import Margin
 from tests.stages.example import everything, made_up_solution, standing
 from tests.stages.refining import carrying
@@ -64,7 +64,7 @@ class Told(Continuation):
             way: Any,
             hand: WholeHand,
             margin: Margin,
-            share: float = 1.0,
+            homotopy: float = 1.0,
             wanted: WholeHand | None = None,
             clear: bool = False,
         ) -> Refined:
@@ -72,15 +72,15 @@ class Told(Continuation):
             wanted = wanted or hand
             assert len(hand.position) == len(wanted.position) == len(model.schedule.samples)
             self.wanted.append(wanted)
-            self.taken.append((level, " ".join(step[0] for step in way), share, float(hand.position[-1, 0])))
+            self.taken.append((level, " ".join(step[0] for step in way), homotopy, float(hand.position[-1, 0])))
             runs = tuple(Run(step[0], made_up_solution({}), margin) for step in way)
             moved = SimpleNamespace(**vars(hand))
-            moved.position = hand.position[:1] + share * np.linspace(0, 1, len(hand.position))[:, None]
+            moved.position = hand.position[:1] + homotopy * np.linspace(0, 1, len(hand.position))[:, None]
             result, worst = WholeHand(**vars(moved)), Worst("a.b", self.violation, None)
-            exact = self.exact_where(level, share, margin)
+            exact = self.exact_where(level, homotopy, margin)
             hopeless = not exact and self.hopeless(level, names(way))
             barely = hopeless or level == self.firmer_on
-            return Refined(result, exact, worst, {level: share}, hopeless, barely, runs, {}, margin, share)
+            return Refined(result, exact, worst, {level: homotopy}, hopeless, barely, runs, {}, margin, homotopy)
 
         return SimpleNamespace(
             model=model,
@@ -91,35 +91,39 @@ class Told(Continuation):
 
     @property
     def ways(self) -> list[tuple[str, str]]:
-        """Knots and way of each solve."""
-        return [(level, way) for level, way, *_ in self.taken]
+        """Knots and steps of each solve."""
+        return [(level, steps) for level, steps, *_ in self.taken]
 
     def shares(self, *levels: str) -> list[float]:
         """The shares that were solved on these knots."""
-        return [share for level, _, share, _ in self.taken if level in levels]
+        return [homotopy for level, _, homotopy, _ in self.taken if level in levels]
 
 
 def names(way: Any) -> str:
     return " ".join(step[0] for step in way)
 
 
-LONG, SHORT = names(LONG_WAY), names(SHORT_WAY)
+LONG, SHORT = names(ALL_STEPS), names(NEARBY_STEPS)
 
 
 def test_a_motion_is_made_exact_on_ever_denser_knots(start: WholeHand) -> None:
-    told = Told(lambda level, share, margin: True)
+    told = Told(lambda level, homotopy, margin: True)
     refined = told.solve(start, Margin())
-    assert told.ways == [("sparse", LONG), ("coarse", "exact"), ("fine", "exact")]
+    assert told.ways == [("sparse", LONG), ("coarse", "hard constraints"), ("fine", "hard constraints")]
     assert all(told.cleared)
     assert refined.exact
-    assert [run.what for run in refined.runs] == [*(f"sparse {step[0]}" for step in LONG_WAY), "coarse exact", "exact"]
+    assert [run.what for run in refined.runs] == [
+        *(f"sparse {step[0]}" for step in ALL_STEPS),
+        "coarse exact",
+        "hard constraints",
+    ]
     assert len(refined.hand.position) == len(MODEL.schedule.samples)
     # The palm goes as it did, not as sparse samples of it.
     np.testing.assert_array_equal(refined.hand.palm_position, start.palm_position)
 
 
 def test_the_motion_stays_near_the_first_on_all_knots(start: WholeHand) -> None:
-    told = Told(lambda level, share, margin: True)
+    told = Told(lambda level, homotopy, margin: True)
     told.solve(start, Margin())
     assert told.wanted[-1] is start
     for wanted, level in zip(told.wanted, LEVELS, strict=True):
@@ -128,14 +132,14 @@ def test_the_motion_stays_near_the_first_on_all_knots(start: WholeHand) -> None:
 
 
 def test_what_fails_on_sparse_knots_is_tried_on_coarse_but_not_on_dense_ones(start: WholeHand) -> None:
-    told = Told(lambda level, share, margin: level != "sparse")
+    told = Told(lambda level, homotopy, margin: level != "sparse")
     assert told.solve(start, Margin()).exact
-    assert told.ways == [("sparse", LONG), ("coarse", LONG), ("fine", "exact")]
-    told = Told(lambda level, share, margin: False)
+    assert told.ways == [("sparse", LONG), ("coarse", LONG), ("fine", "hard constraints")]
+    told = Told(lambda level, homotopy, margin: False)
     refined = told.solve(start, Margin())
     assert told.ways == [("sparse", LONG), ("coarse", LONG)]
     assert not refined.exact
-    assert len(refined.runs) == 2 * len(LONG_WAY)
+    assert len(refined.runs) == 2 * len(ALL_STEPS)
     assert len(refined.hand.position) == len(MODEL.schedule.samples)
     np.testing.assert_array_equal(refined.hand.active, start.active)
 
@@ -145,7 +149,7 @@ def test_hands_that_leave_the_object_one_way_to_go_are_not_tried_on_more_knots(
     start: WholeHand, joints: tuple[int, int], more: bool
 ) -> None:
     # Of the object's six velocities and two joints' two contacts that roll leave two, of six and one joint's one.
-    told = Told(lambda level, share, margin: False)
+    told = Told(lambda level, homotopy, margin: False)
     told.joints = joints
     told.solve(start, Margin())
     assert told.ways == [("sparse", LONG), ("coarse", LONG)][: 1 + more]
@@ -157,38 +161,38 @@ def test_hands_that_leave_the_object_one_way_to_go_are_not_tried_on_more_knots(
 
 
 def test_where_fingers_cannot_roll_no_other_knots_are_tried(start: WholeHand) -> None:
-    told = Told(lambda level, share, margin: False, hopeless=lambda level, way: True)
+    told = Told(lambda level, homotopy, margin: False, hopeless=lambda level, way: True)
     refined = told.solve(start, Margin())
     assert told.ways == [("sparse", LONG)]
     assert refined.slips_hopelessly
     assert refined.barely_rolls
     assert refined.slips == {"sparse": 1.0}
     # Without physics, slip says nothing: there may be too few knots.
-    told = Told(lambda level, share, margin: level != "sparse", hopeless=lambda level, way: True, violation=1e-3)
+    told = Told(lambda level, homotopy, margin: level != "sparse", hopeless=lambda level, way: True, violation=1e-3)
     assert told.solve(start, Margin()).exact
-    assert told.ways == [("sparse", LONG), ("coarse", LONG), ("fine", "exact")]
+    assert told.ways == [("sparse", LONG), ("coarse", LONG), ("fine", "hard constraints")]
 
 
 def test_what_misses_less_is_exact_goes_farther_rolls_or_violates_less(start: WholeHand) -> None:
     exact = Refined(start, True, Worst("a", 1e-9, None), {}, False, False, (), {}, Margin(), 0.5)
-    farther = replace(exact, met=False, worst=Worst("a", 1e-3, None), share=0.9)
-    whole = replace(farther, share=1.0)
+    farther = replace(exact, met=False, worst=Worst("a", 1e-3, None), homotopy=0.9)
+    whole = replace(farther, homotopy=1.0)
     slips = replace(whole, slips_hopelessly=True, worst=Worst("b", 1e-6, None))
     far = replace(whole, worst=Worst("a", 1.0, None))
-    ranked = [replace(exact, share=1.0), exact, whole, far, slips, farther]
+    ranked = [replace(exact, homotopy=1.0), exact, whole, far, slips, farther]
     for i, better in enumerate(ranked):
         assert [better.misses_less_than(other) for other in ranked] == [i < k for k in range(len(ranked))]
 
 
 def test_what_slips_only_on_coarse_knots_is_not_said_to_slip(start: WholeHand) -> None:
     # On sparse knots it rolls, and near that motion it misses less than where firm solves go from there.
-    told = Told(lambda level, share, margin: level == "sparse", hopeless=lambda level, way: way == SHORT)
+    told = Told(lambda level, homotopy, margin: level == "sparse", hopeless=lambda level, way: way == SHORT)
     refined = told.solve(start, Margin())
-    assert told.ways == [("sparse", LONG), ("coarse", "exact"), ("coarse", SHORT)]
+    assert told.ways == [("sparse", LONG), ("coarse", "hard constraints"), ("coarse", SHORT)]
     assert not refined.slips_hopelessly
     assert not refined.barely_rolls
-    steps = ["exact", *(step[0] for step in SHORT_WAY)]
-    assert [run.what for run in refined.runs[len(LONG_WAY) :]] == [f"coarse {step}" for step in steps]
+    steps = ["hard constraints", *(step[0] for step in NEARBY_STEPS)]
+    assert [run.what for run in refined.runs[len(ALL_STEPS) :]] == [f"coarse {step}" for step in steps]
 
 
 @pytest.mark.parametrize("firmer_on", ["", "sparse", "coarse"])
@@ -196,80 +200,85 @@ def test_what_slips_only_on_coarse_knots_is_not_said_to_slip(start: WholeHand) -
 def test_what_is_found_rolls_barely_where_its_own_knots_took_a_firmer_solve(
     start: WholeHand, firmer_on: str, exact_on: str
 ) -> None:
-    told = Told(lambda level, share, margin: level != "sparse" or exact_on == "sparse", firmer_on=firmer_on)
+    told = Told(lambda level, homotopy, margin: level != "sparse" or exact_on == "sparse", firmer_on=firmer_on)
     assert told.solve(start, Margin()).barely_rolls == (firmer_on == exact_on)
     told.taken.clear()
-    assert told.lengthen(start, 0.5, Margin()).barely_rolls == (firmer_on == exact_on)
+    assert told.continue_from(start, 0.5, Margin()).barely_rolls == (firmer_on == exact_on)
 
 
 def test_what_fails_on_coarse_knots_is_not_tried_on_dense_ones(start: WholeHand) -> None:
-    told = Told(lambda level, share, margin: level == "sparse")
+    told = Told(lambda level, homotopy, margin: level == "sparse")
     refined = told.solve(start, Margin())
-    assert told.ways == [("sparse", LONG), ("coarse", "exact"), ("coarse", SHORT)]
+    assert told.ways == [("sparse", LONG), ("coarse", "hard constraints"), ("coarse", SHORT)]
     assert not refined.exact
     assert len(refined.hand.position) == len(MODEL.schedule.samples)
 
 
 def test_near_motions_take_the_short_way_and_the_long_one_where_it_fails(start: WholeHand) -> None:
-    told = Told(lambda level, share, margin: level != "fine")
+    told = Told(lambda level, homotopy, margin: level != "fine")
     refined = told.solve(start, Margin(), near=True)
-    denser = [("coarse", "exact"), ("fine", "exact"), ("fine", SHORT)]
+    denser = [("coarse", "hard constraints"), ("fine", "hard constraints"), ("fine", SHORT)]
     assert told.ways == [("sparse", SHORT), *denser, ("sparse", LONG), *denser]
     assert not refined.exact
     assert len(refined.runs) == sum(len(way.split()) for _, way in told.ways)
 
 
 def test_a_motion_is_lengthened_until_it_reaches_its_goals(start: WholeHand) -> None:
-    told = Told(lambda level, share, margin: True)
-    refined = told.lengthen(start, 0.5, Margin())
+    told = Told(lambda level, homotopy, margin: True)
+    refined = told.continue_from(start, 0.5, Margin())
     assert told.shares(*LEVELS) == pytest.approx([0.5, 2 / 3, 5 / 6, 1.0, 1.0, 1.0])
-    assert told.ways == [("sparse", LONG), *3 * [("sparse", SHORT)], ("coarse", "exact"), ("fine", "exact")]
-    # Each begins where the ones before lead: the object went as far as its share.
+    assert told.ways == [
+        ("sparse", LONG),
+        *3 * [("sparse", SHORT)],
+        ("coarse", "hard constraints"),
+        ("fine", "hard constraints"),
+    ]
+    # Each begins where the ones before lead: the object went as far as its homotopy.
     begun = np.diff([place for *_, place in told.taken[1:4]])
     np.testing.assert_allclose(begun, 1 / 6)
     assert refined.exact
-    assert refined.share == 1
+    assert refined.homotopy == 1
     assert refined.runs[0][0] == "sparse 50% of the way, soft"
 
 
 def test_steps_get_shorter_where_they_fail_and_the_longest_exact_motion_is_kept(start: WholeHand) -> None:
-    told = Told(lambda level, share, margin: share < 0.8)
-    refined = told.lengthen(start, 0.1, Margin())
+    told = Told(lambda level, homotopy, margin: homotopy < 0.8)
+    refined = told.continue_from(start, 0.1, Margin())
     tried = [0.1, 0.4, 0.7, 1.0, 0.85, 0.775, 0.85]
     assert told.shares("sparse") == pytest.approx(tried)
     # On coarse knots it gets no farther: what was found first is made exact there.
-    assert told.shares("coarse") == pytest.approx([*tried, refined.share])
-    assert told.shares("fine") == [refined.share]
-    assert refined.share == pytest.approx(0.775)
+    assert told.shares("coarse") == pytest.approx([*tried, refined.homotopy])
+    assert told.shares("fine") == [refined.homotopy]
+    assert refined.homotopy == pytest.approx(0.775)
     assert not refined.exact
-    assert told.taken[-1][:3] == ("fine", "exact", refined.share)
-    assert 0.3 / 2**2 > SHORTEST > 0.3 / 2**3
+    assert told.taken[-1][:3] == ("fine", "hard constraints", refined.homotopy)
+    assert 0.3 / 2**2 > LEAST_STEP > 0.3 / 2**3
 
 
 def test_what_goes_farther_on_coarse_knots_is_kept(start: WholeHand) -> None:
-    told = Told(lambda level, share, margin: level != "sparse" or share < 0.6)
-    refined = told.lengthen(start, 0.5, Margin())
+    told = Told(lambda level, homotopy, margin: level != "sparse" or homotopy < 0.6)
+    refined = told.continue_from(start, 0.5, Margin())
     assert told.shares("coarse") == pytest.approx([0.5, 2 / 3, 5 / 6, 1.0])
     assert refined.exact
     assert told.shares("fine") == [1.0]
 
 
 def test_an_exact_motion_is_not_given_up_for_a_longer_one_that_is_not(start: WholeHand) -> None:
-    told = Told(lambda level, share, margin: share < {"sparse": 0.8, "coarse": 0.1, "fine": 0.8}[level])
-    refined = told.lengthen(start, 0.5, Margin())
-    assert refined.share == max(share for share in told.shares("sparse") if share < 0.8)
+    told = Told(lambda level, homotopy, margin: homotopy < {"sparse": 0.8, "coarse": 0.1, "fine": 0.8}[level])
+    refined = told.continue_from(start, 0.5, Margin())
+    assert refined.homotopy == max(homotopy for homotopy in told.shares("sparse") if homotopy < 0.8)
 
 
 def test_a_motion_of_which_no_part_is_exact_is_not_lengthened(start: WholeHand) -> None:
-    told = Told(lambda level, share, margin: False)
-    refined = told.lengthen(start, 0.5, Margin())
+    told = Told(lambda level, homotopy, margin: False)
+    refined = told.continue_from(start, 0.5, Margin())
     assert told.shares(*LEVELS) == 2 * [0.5, 0.25, 0.125]
-    assert (refined.exact, refined.share) == (False, 0.125)
+    assert (refined.exact, refined.homotopy) == (False, 0.125)
 
 
 def test_where_the_first_part_fails_a_shorter_one_is_looked_for(start: WholeHand) -> None:
-    told = Told(lambda level, share, margin: share < 0.3 or len(told.taken) > 1)
-    refined = told.lengthen(start, 0.5, Margin())
+    told = Told(lambda level, homotopy, margin: homotopy < 0.3 or len(told.taken) > 1)
+    refined = told.continue_from(start, 0.5, Margin())
     assert told.shares("sparse") == pytest.approx([0.5, 0.25, 0.5, 0.75, 1.0])
     first, second = (place for *_, place in told.taken[:2])
     assert second - start.position[0, 0] == pytest.approx((first - start.position[0, 0]) / 2)
@@ -279,39 +288,48 @@ def test_where_the_first_part_fails_a_shorter_one_is_looked_for(start: WholeHand
 @pytest.mark.parametrize("fails_on", ["", "sparse", "coarse", "fine"])
 def test_a_firmer_grip_is_kept_where_it_is_exact_and_the_other_one_elsewhere(start: WholeHand, fails_on: str) -> None:
     firm = Margin(normal_force=2.0)
-    told = Told(lambda level, share, margin: not (margin == firm and level == fails_on))
-    refined = told.lengthen(start, 0.5, Margin(), firm)
+    told = Told(lambda level, homotopy, margin: not (margin == firm and level == fails_on))
+    refined = told.continue_from(start, 0.5, Margin(), firm)
     assert refined.exact
     assert refined.margin == (Margin() if fails_on else firm)
     steps = {
-        "": ["sparse firm", "sparse exact", "coarse exact", "exact"],
+        "": ["sparse firm", "sparse exact", "coarse exact", "hard constraints"],
         "sparse": ["sparse firm", "sparse exact"],
-        "coarse": ["sparse firm", "sparse exact", "coarse exact", "coarse firm", "coarse exact"],
-        "fine": ["sparse firm", "sparse exact", "coarse exact", "exact", "firm", "exact"],
+        "coarse": ["sparse firm", "sparse exact", "coarse exact", "coarse stiff penalty", "coarse exact"],
+        "fine": [
+            "sparse firm",
+            "sparse exact",
+            "coarse exact",
+            "hard constraints",
+            "stiff penalty",
+            "hard constraints",
+        ],
     }[fails_on]
     assert [run.what for run in refined.runs if run.margin == firm] == [f"firmer grip, {step}" for step in steps]
     if fails_on:
-        assert [run.what for run in refined.runs[-2:]] == ["coarse exact", "exact"]
+        assert [run.what for run in refined.runs[-2:]] == ["coarse exact", "hard constraints"]
     # The whole way with the first margin was gone once.
     assert [run.what for run in refined.runs].count("sparse 50% of the way, soft") == 1
 
 
 def test_a_short_rest_of_the_way_is_gone_in_one_step(start: WholeHand) -> None:
-    told = Told(lambda level, share, margin: True)
-    refined = told.lengthen(start, 0.96, Margin())
+    told = Told(lambda level, homotopy, margin: True)
+    refined = told.continue_from(start, 0.96, Margin())
     assert told.shares("sparse") == pytest.approx([0.96, 1.0])
     assert refined.exact
 
 
-@pytest.mark.parametrize(("answers", "exact"), [([True], True), ([False, True], True), ([False, False], False)])
+@pytest.mark.parametrize(
+    ("answers", "hard constraints"), [([True], True), ([False, True], True), ([False, False], False)]
+)
 def test_a_motion_that_is_exact_but_for_its_samples_takes_the_last_step_alone(
     start: WholeHand, answers: list[bool], exact: bool
 ) -> None:
     left = iter(answers)
-    told = Told(lambda level, share, margin: next(left))
+    told = Told(lambda level, homotopy, margin: next(left))
     assert told.renew(start, Margin()).exact == exact
     # Where a small barrier leads nowhere a larger one is tried.
-    assert told.ways == len(answers) * [("fine", "exact")]
+    assert told.ways == len(answers) * [("fine", "hard constraints")]
 
 
 @pytest.mark.parametrize(("grip", "factor"), [(2.0, 4.0), (0.25, 1.0)])
@@ -320,9 +338,9 @@ def test_a_grip_is_made_firmer_on_few_knots_first_from_a_motion_that_presses_as_
 ) -> None:
     kept, other = Margin(normal_force=0.5), Margin(normal_force=grip)
     exact = Refined(start, True, Worst("a", 0.0, None), {}, False, False, (), {}, kept)
-    told = Told(lambda level, share, margin: margin == other)
-    assert told.regrip(exact, other).exact
-    assert told.ways == [("sparse", SHORT), ("coarse", "exact"), ("fine", "exact")]
+    told = Told(lambda level, homotopy, margin: margin == other)
+    assert told.with_margin(exact, other).exact
+    assert told.ways == [("sparse", SHORT), ("coarse", "hard constraints"), ("fine", "hard constraints")]
     found, fingers = told.wanted[-1].force, [0, 2]
     np.testing.assert_array_equal(found[:, fingers], factor * start.force[:, fingers])
     # What the ground and other contacts bear follows from that.

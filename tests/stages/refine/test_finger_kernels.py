@@ -58,7 +58,7 @@ class Contact:
         """Variables and parameters of the contact's kernel."""
         variables = {"pose": self.place.pose, "point": self.point, "force": self.force, "angles": self.finger.angles[0]}
         wanted = {"wanted_point": self.wanted_point, "wanted_force": self.wanted_force}
-        kept = {"branch": self.branch} if self.branch.size else {}
+        kept = {"margin_direction": self.branch} if self.branch.size else {}
         return {**shape(self.finger), **variables}, {
             **self.scene,
             "friction": self.friction,
@@ -105,15 +105,15 @@ def test_a_contact_s_numbers_are_those_of_numpy_and_pinocchio(joints: int, seed:
     left, singular, _ = np.linalg.svd(jacobian)
     kept = np.ones(3)
     kept[: len(singular)] = 0.06**4 / (singular**4 + 0.06**4)
-    passive = left @ (kept * (left.T @ in_palm))
-    np.testing.assert_allclose(found["passive"], passive, atol=1e-6)
-    np.testing.assert_allclose(found["passive_force"], passive @ passive, atol=1e-6)
+    structural = left @ (kept * (left.T @ in_palm))
+    np.testing.assert_allclose(found["structural"], structural, atol=1e-6)
+    np.testing.assert_allclose(found["passive_force"], structural @ structural, atol=1e-6)
     np.testing.assert_allclose(found["torque"], jacobian.T @ in_palm, atol=1e-6)
-    assert ("regular" in found) == (joints in (2, 3))
+    assert ("singularity_margin" in found) == (joints in (2, 3))
     if joints == 2:
-        np.testing.assert_allclose(found["regular"], case.branch @ np.cross(*jacobian.T), atol=1e-6)
+        np.testing.assert_allclose(found["singularity_margin"], case.branch @ np.cross(*jacobian.T), atol=1e-6)
     if joints == 3:
-        np.testing.assert_allclose(found["regular"], case.branch * np.linalg.det(jacobian), atol=1e-6)
+        np.testing.assert_allclose(found["singularity_margin"], case.branch * np.linalg.det(jacobian), atol=1e-6)
     np.testing.assert_allclose(
         found["stay_point"], case.tie**2 * ((case.point - case.wanted_point) ** 2).sum(), rtol=1e-12
     )
@@ -148,11 +148,11 @@ def test_a_second_force_is_held_as_the_first(joints: int) -> None:
     case = Contact(joints, 7)
     first = numbers(finger_kernels.contact(joints, limited=True), *case.contact)
     second = numbers(finger_kernels.disturbed_contact(joints, limited=True), *case.disturbed)
-    assert set(second) == {"pressing", "cone", "passive", "torque", "passive_force"}
+    assert set(second) == {"pressing", "cone", "structural", "torque", "passive_force"}
     for name, value in second.items():
         np.testing.assert_allclose(value, first[name], rtol=1e-12, atol=1e-12)
     third = numbers(finger_kernels.actuated(joints), *case.actuated)
-    assert set(third) == {"passive", "passive_force"}
+    assert set(third) == {"structural", "passive_force"}
     for name, value in third.items():
         np.testing.assert_allclose(value, first[name], rtol=1e-12, atol=1e-12)
     # Turned about the normal, the force is as well within the cone; doubled, four times as far from its edge.
@@ -341,7 +341,7 @@ def test_smoothness_and_staying() -> None:
     found = numbers(finger_kernels.joint_jerk(2), {f"angles{i}": angles[i] for i in range(4)}, steps)
     np.testing.assert_allclose(found["joint_jerk"], sum(c.deriv(3)(0.0) ** 2 for c in curve), rtol=1e-9)
     finger, other = random_finger(2, rng), random_finger(2, rng)
-    found = numbers(finger_kernels.stay(2), *stay_block(finger, other))
+    found = numbers(finger_kernels.near_design(2), *stay_block(finger, other))
     apart = [finger.base - other.base, finger.lengths - other.lengths, finger.axes - other.axes]
     np.testing.assert_allclose(found["stay_design"], sum((a**2).sum() for a in apart), rtol=1e-12)
     np.testing.assert_allclose(found["on_palm"], finger.base @ finger.base, rtol=1e-12)
@@ -368,7 +368,7 @@ def test_derivatives_agree_with_differences() -> None:
             finger_kernels.joint_motion(2, limited=True),
             ({f"angles{i}": angles[i] for i in range(3)}, {"step0": STEP, "step1": 0.7 * STEP}),
         ),
-        (finger_kernels.stay(2), stay_block(one, random_finger(2, rng))),
+        (finger_kernels.near_design(2), stay_block(one, random_finger(2, rng))),
     ):
         check_block(kernel, variables, parameters)
 

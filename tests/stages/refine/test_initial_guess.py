@@ -10,7 +10,7 @@ from scipy.linalg import null_space
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.motion import Schedule
-from casadi_hands.stages.refine.initial_guess import balanced, perturbations, rates_and_wrenches
+from casadi_hands.stages.refine.initial_guess import balanced, disturbance_wrenches, rates_and_wrenches
 from tests.stages.example import everything
 
 Array = np.ndarray
@@ -51,10 +51,10 @@ def test_rates_and_wrenches_are_those_of_newton_and_euler() -> None:
 
 def test_perturbations_are_turned_into_the_object() -> None:
     _, model = everything()
-    vectors = np.random.default_rng(2).normal(size=model.disturbance_force.shape)
+    vectors = np.random.default_rng(2).normal(size=model.disturbance.force.shape)
     turns = Rotation.from_rotvec(vectors) * Rotation.from_quat(model.reference, scalar_first=True)
-    found = perturbations(model, vectors)
-    for columns, given in ((found[:, :3], model.disturbance_force), (found[:, 3:], model.disturbance_torque)):
+    found = disturbance_wrenches(model, vectors)
+    for columns, given in ((found[:, :3], model.disturbance.force), (found[:, 3:], model.disturbance.torque)):
         np.testing.assert_allclose(turns.apply(columns), given, atol=1e-12)
     assert found.any()
 

@@ -12,7 +12,7 @@ import pytest
 from casadi_hands.problem.resampling import resampled_model
 from casadi_hands.stages.refine import stage
 from casadi_hands.stages.refine.inter_knot import DEEP, pass_through
-from casadi_hands.stages.refine.settings import LAST
+from casadi_hands.stages.refine.settings import LAST_STEP
 from casadi_hands.stages.refine.stage import RefineStage
 from casadi_hands.stages.refine.values import Margin
 from tests.stages.blocks import coal_distance, segment
@@ -34,8 +34,8 @@ def shallowest(made_up: MadeUp, angles: tuple[Array, Array]) -> float:
     fingers = [PinFinger(finger, radius) for finger in made_up.start.fingers]
     for k, step in enumerate(np.diff(made_up.model.schedule.samples)):
         parts = next(n for n in range(2, 9) if step / n <= 0.1 + 1e-9)
-        for share in np.arange(1, parts) / parts:
-            links = [f.links((1 - share) * a[k] + share * a[k + 1]) for f, a in zip(fingers, angles, strict=True)]
+        for homotopy in np.arange(1, parts) / parts:
+            links = [f.links((1 - homotopy) * a[k] + homotopy * a[k + 1]) for f, a in zip(fingers, angles, strict=True)]
             for one in links[0]:
                 for other in links[1]:
                     least = min(least, coal_distance(segment(*one, radius), segment(*other, radius)))
@@ -73,7 +73,7 @@ def test_what_passes_through_is_solved_again_with_guards(
         return replace(solve(stage, *given), met=met)
 
     monkeypatch.setattr(RefineStage, "take", told)
-    short = (briefly(LAST[0]),)
+    short = (briefly(LAST_STEP[0]),)
     refined = wide.stage.take_clear(short, wide.start, Margin())
     assert taken == [False, True][: 2 if met and passes else 1]
     assert len(refined.runs) == len(taken)

@@ -162,7 +162,7 @@ def test_what_keeps_the_motion_smooth_and_near() -> None:
     found = numbers(body.force_change(2), {"force0": before, "force1": after}, {})
     np.testing.assert_allclose(found["force_change"], ((after - before) ** 2).sum(), rtol=1e-12)
     pose, wanted = rng.normal(size=(2, 6))
-    found = numbers(body.stay_on_path(), {"pose": pose}, {"wanted_pose": wanted})
+    found = numbers(body.near_path(), {"pose": pose}, {"wanted_pose": wanted})
     np.testing.assert_allclose(found["stay_path"], ((pose - wanted) ** 2).sum(), rtol=1e-12)
     found = numbers(body.meet_goal(), {"pose": pose}, {"goal_pose": wanted})
     np.testing.assert_allclose(found["goal"], ((pose - wanted) ** 2).sum(), rtol=1e-12)
@@ -425,7 +425,7 @@ def test_derivatives_agree_with_differences() -> None:
             ),
         ),
         (body.force_change(2), ({"force0": forces[:6], "force1": forces[6:]}, {})),
-        (body.stay_on_path(), ({"pose": place.pose}, {"wanted_pose": rng.normal(size=6)})),
+        (body.near_path(), ({"pose": place.pose}, {"wanted_pose": rng.normal(size=6)})),
         (body.meet_goal(), ({"pose": place.pose}, {"goal_pose": rng.normal(size=6)})),
         (body.ground_contact(), touching(lying, lying.beneath(0.4) + 0.1, force)),
         (body.disturbed_ground(), ({"pose": place.pose, "force": force}, {**reference, "friction": MU})),

@@ -114,8 +114,8 @@ def test_disturbances_are_held_at_their_time(loaded: MadeUp) -> None:
     assert len(found) == len(second)
     for row, k, forces in zip(found, loaded.stage.built.disturbed, second, strict=True):
         inverse = loaded.turns[k].inv()
-        force = forces.sum(axis=0) + inverse.apply(model.disturbance_force[k])
-        torque = np.cross(loaded.points[k], forces).sum(axis=0) + inverse.apply(model.disturbance_torque[k])
+        force = forces.sum(axis=0) + inverse.apply(model.disturbance.force[k])
+        torque = np.cross(loaded.points[k], forces).sum(axis=0) + inverse.apply(model.disturbance.torque[k])
         np.testing.assert_allclose(row, np.r_[force, torque] - values["wrench"][k], atol=1e-12)
 
 
@@ -170,8 +170,8 @@ def test_forces_are_actuated_in_the_middle_between_knots_too(loaded: MadeUp) -> 
     for i, c in enumerate((0, 2)):
         finger = loaded.start.fingers[i]
         intervals = np.flatnonzero(loaded.active[:-1, c])
-        assert len(found[f"inter_knot{c}.passive"]) == len(intervals)
-        for row, k in zip(found[f"inter_knot{c}.passive"], intervals, strict=True):
+        assert len(found[f"inter_knot{c}.structural"]) == len(intervals)
+        for row, k in zip(found[f"inter_knot{c}.structural"], intervals, strict=True):
             moving = (values["pose"], loaded.points[:, i], values[f"angles{c}"], loaded.forces[:, i])
             middles = [(array[k] + array[k + 1]) / 2 for array in moving]
             variables = {name: values[f"{name}{c}"] for name in ("base", "lengths", "axes")}
@@ -185,7 +185,7 @@ def test_forces_are_actuated_in_the_middle_between_knots_too(loaded: MadeUp) -> 
             }
             variables |= dict(zip(("pose", "point", "angles", "force"), middles, strict=True))
             expected = numbers(finger_kernels.actuated(finger.joints), variables, parameters)
-            np.testing.assert_allclose(row, expected["passive"], atol=1e-12)
+            np.testing.assert_allclose(row, expected["structural"], atol=1e-12)
 
 
 def test_lifted_fingers_are_clear_in_the_middle_between_knots_too(loaded: MadeUp) -> None:

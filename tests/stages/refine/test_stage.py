@@ -23,7 +23,7 @@ from casadi_hands.stages.refine import continuation
 from casadi_hands.stages.refine import stage as refine
 from casadi_hands.stages.refine.continuation import Continuation
 from casadi_hands.stages.refine.result import Refined, Worst
-from casadi_hands.stages.refine.settings import ACCEPTED, HARD, HOPELESS, LONG_WAY, PROJECTION, WEIGHTS
+from casadi_hands.stages.refine.settings import ACCEPTED, ALL_STEPS, HARD_CONSTRAINTS, HOPELESS, RESTORATION, WEIGHTS
 from casadi_hands.stages.refine.stage import RefineStage
 from casadi_hands.stages.refine.values import TOOL_TOLERANCE, Margin, RefineValues, longest_run
 from casadi_hands.task import Task, load_task
@@ -93,20 +93,20 @@ def test_a_drawing_s_goals_bound_its_tool_and_not_its_pose(drawn: MadeUp) -> Non
 
 
 def test_margins_are_bounds_of_contacts_while_they_bear(made_up: MadeUp) -> None:
-    always, *others = made_up.stage.given.constraint_bounds(Margin(normal_force=0.7, passive=0.02))
+    always, *others = made_up.stage.given.constraint_bounds(Margin(normal_force=0.7, structural=0.02))
     low, high = always["contact2.pressing"]
     # Lifted in samples 4 to 6, so that it bears nothing in 4 to 7; within half a second of these it bears less.
     times = made_up.model.schedule.samples
-    share = np.array([min(1.0, max(0, times[4] - t, t - times[7]) / 0.5) for t in times])
-    assert 0 < share[3] < 0.3
-    assert 0 < share[8] < 0.3
-    np.testing.assert_allclose(np.ravel(low), 0.7 * share[made_up.touching[:, 1]])
+    homotopy = np.array([min(1.0, max(0, times[4] - t, t - times[7]) / 0.5) for t in times])
+    assert 0 < homotopy[3] < 0.3
+    assert 0 < homotopy[8] < 0.3
+    np.testing.assert_allclose(np.ravel(low), 0.7 * homotopy[made_up.touching[:, 1]])
     assert high == np.inf
     exact = {name: bounds for part in others for name, bounds in part.items()}
     for c in (0, 2):
         for block in ("contact", "disturbed_contact"):
-            assert exact[f"{block}{c}.passive"] == (-0.02, 0.02)
-        assert exact[f"inter_knot{c}.passive"] == pytest.approx((-0.2, 0.2))
+            assert exact[f"{block}{c}.structural"] == (-0.02, 0.02)
+        assert exact[f"inter_knot{c}.structural"] == pytest.approx((-0.2, 0.2))
     # None of them is the name of nothing.
     assert {*always, *exact} <= set(made_up.stage.problem.constraint_rows)
 
@@ -177,7 +177,7 @@ def test_friction_keeps_its_margin_on_fingers_and_ground(made_up: MadeUp) -> Non
 def test_a_result_has_every_contact_in_its_own_place(made_up: MadeUp) -> None:
     # The middle finger is not in use: its point stays, and it bears nothing.
     start, values = made_up.start, made_up.values
-    excess = {"stay0.on_palm": np.array([[ACCEPTED]]), "stay2.on_palm": np.zeros((1, 1))}
+    excess = {"near_design0.on_palm": np.array([[ACCEPTED]]), "near_design2.on_palm": np.zeros((1, 1))}
     refined = made_up.refined(made_up.solution(excess), Margin(friction=0.3))
     assert refined.margin == Margin(friction=0.3)
     hand, count = refined.hand, len(start.position)
@@ -191,7 +191,7 @@ def test_a_result_has_every_contact_in_its_own_place(made_up: MadeUp) -> None:
     assert not hand.active[:, 1].any()
     np.testing.assert_array_equal(np.hstack([hand.position, hand.vector]), values["pose"])
     assert refined.exact
-    assert refined.worst == Worst("stay0.on_palm", ACCEPTED, None, (0,), limits.ON_PALM)
+    assert refined.worst == Worst("near_design0.on_palm", ACCEPTED, None, (0,), limits.ON_PALM)
     # Nor is it a contact of the motion that is written: no link is there to touch.
     first, _, last = made_up.model.contact_names
     motion = whole_hand_motion(made_up.model, replace(hand, fingers=start.fingers, angles=start.angles))
@@ -204,10 +204,12 @@ def test_a_result_has_every_contact_in_its_own_place(made_up: MadeUp) -> None:
 @pytest.mark.parametrize("violation", [1.01 * ACCEPTED, np.inf])
 def test_a_motion_that_violates_is_not_exact(made_up: MadeUp, violation: float) -> None:
     refined = made_up.refined(
-        made_up.solution({name: np.array([[x]]) for name, x in (("stay0.on_palm", 0.0), ("stay2.on_palm", violation))})
+        made_up.solution(
+            {name: np.array([[x]]) for name, x in (("near_design0.on_palm", 0.0), ("near_design2.on_palm", violation))}
+        )
     )
     assert not refined.exact
-    assert refined.worst == Worst("stay2.on_palm", violation, None, (2,), limits.ON_PALM)
+    assert refined.worst == Worst("near_design2.on_palm", violation, None, (2,), limits.ON_PALM)
 
 
 @pytest.mark.parametrize(
@@ -230,13 +232,13 @@ def test_the_worst_violation_is_told_with_its_time_and_whom_it_is_about(
     rows = made_up.stage.problem.constraint_rows[constraint]
     excess = np.zeros(rows.shape)
     excess[instance, -1] = 2.0
-    worst = made_up.refined(made_up.solution({constraint: excess, "stay0.on_palm": np.ones((1, 1))})).worst
+    worst = made_up.refined(made_up.solution({constraint: excess, "near_design0.on_palm": np.ones((1, 1))})).worst
     assert (worst.constraint, worst.violation, worst.contacts) == (constraint, 2.0, contacts)
     assert worst.declared.name == constraint.split(".")[1]
     assert worst.time == pytest.approx(made_up.model.schedule.samples[sample])
 
 
-@pytest.mark.parametrize("options", [HARD, PROJECTION])
+@pytest.mark.parametrize("options", [HARD_CONSTRAINTS, RESTORATION])
 def test_no_exact_solve_may_end_with_more_violation_than_is_accepted(options: Options) -> None:
     assert options.ipopt()["constr_viol_tol"] <= ACCEPTED
     assert options.ipopt()["acceptable_constr_viol_tol"] <= ACCEPTED
@@ -269,7 +271,7 @@ def test_costs_hold_near_to_the_wanted_motion_and_constraints_to_where_it_is(mad
 def test_a_start_that_is_no_number_is_never_accepted(drawn: MadeUp) -> None:
     # IPOPT does not even begin; what it says of such a solve is that nothing is violated.
     values = drawn.stage.given.start(drawn.start) | {"point": np.full_like(drawn.values["point"], np.nan)}
-    solution = drawn.stage.solver.solve(values, drawn.parameters(WEIGHTS), HARD)
+    solution = drawn.stage.solver.solve(values, drawn.parameters(WEIGHTS), HARD_CONSTRAINTS)
     assert solution.objective == np.inf
     assert solution.violations["wrench.sum"] == np.inf
     assert not drawn.refined(solution).exact
@@ -314,7 +316,7 @@ def test_the_result_is_exact_and_the_audit_certifies_it(solved: Solved) -> None:
     assert solved.verdict.reasons == []
     assert solved.verdict.certified
     names = [run.what for run in solved.refined.runs]
-    assert (names[0], names[-1]) == ("sparse soft", "exact")
+    assert (names[0], names[-1]) == ("sparse soft", "hard constraints")
 
 
 def test_the_files_have_the_points_and_forces_that_balance(solved: Solved) -> None:
@@ -391,9 +393,9 @@ def test_one_joint_cannot_roll_with_the_object_and_no_exact_solve_is_tried(solve
         assert refined.slips[name] == pytest.approx(steps.sum(), rel=1e-12)
     names = [run.what for run in refined.runs]
     assert names[0] == "sparse soft"
-    assert not any("exact" in name for name in names)
+    assert not any("hard constraints" in name for name in names)
     assert len(refined.hand.position) == len(model.schedule.samples)
-    assert refined.weights == {f"sparse {what}": weights for what, weights, _ in LONG_WAY}[names[-1]]
+    assert refined.weights == {f"sparse {what}": weights for what, weights, _ in ALL_STEPS}[names[-1]]
 
 
 def test_an_exact_motion_stays_itself_by_the_short_way(solved: Solved) -> None:
@@ -403,10 +405,10 @@ def test_an_exact_motion_stays_itself_by_the_short_way(solved: Solved) -> None:
     assert again.exact
     assert {run.margin for run in again.runs} == {Margin()}
     names = [run.what for run in again.runs]
-    assert (names[0], names[-1]) == ("exact", "exact")
-    assert not any("soft" in name for name in names)
+    assert (names[0], names[-1]) == ("hard constraints", "hard constraints")
+    assert not any("penalty" in name for name in names)
     # It could have stayed as it was: what it leaves, it leaves for a gain.
-    assert again.hand.solution.objective <= sum(ways.fine.costs(LONG_WAY[-1], before, Margin()).values())
+    assert again.hand.solution.objective <= sum(ways.fine.costs(ALL_STEPS[-1], before, Margin()).values())
     np.testing.assert_allclose(again.hand.position, before.position, atol=0.02)
     assert all(0 < slip < 4e-3 for slip in again.slips.values())
 
@@ -422,37 +424,37 @@ def test_an_exact_solve_that_is_cut_short_ends_with_the_exact_motion_nearest_to_
 ) -> None:
     model, before = farther_to_the_side(solved), solved.refined.hand
     stage = RefineStage(model, before.contacts, (2,) * model.contacts, before.active)
-    last, weights, options = LONG_WAY[-1]
-    way = ((last, weights, replace(options, max_iter=1)),)
-    found = stage.take(way, before, Margin())
+    last, weights, options = ALL_STEPS[-1]
+    steps = ((last, weights, replace(options, max_iter=1)),)
+    found = stage.take(steps, before, Margin())
     assert found.exact
     solution = found.hand.solution
     assert (solution.terms.keys(), solution.violation <= ACCEPTED) == (set(stage.problem.terms), True)
     assert solution.objective == pytest.approx(sum(solution.terms.values()))
-    assert solution.objective == pytest.approx(sum(stage.costs(way[0], found.hand, Margin()).values()), rel=0.5)
+    assert solution.objective == pytest.approx(sum(stage.costs(steps[0], found.hand, Margin()).values()), rel=0.5)
     # The second goal is 0.05 away, and nothing has to go farther.
     assert np.abs(found.hand.position - before.position).max() < 0.06
     with monkeypatch.context() as brief:
-        for name in ("GOOD", "PROJECTION"):
+        for name in ("GOOD", "RESTORATION"):
             brief.setattr(refine, name, replace(getattr(refine, name), max_iter=1))
-        assert stage.take(way, before, Margin()).runs[-1].solution.iterations == 3  # what was in vain is told, too
-    monkeypatch.setattr(RefineStage, "_projected", lambda self, solution, *_: solution)
-    assert not stage.take(way, before, Margin()).met
+        assert stage.take(steps, before, Margin()).runs[-1].solution.iterations == 3  # what was in vain is told, too
+    monkeypatch.setattr(RefineStage, "_restored", lambda self, solution, *_: solution)
+    assert not stage.take(steps, before, Margin()).met
 
 
 def test_where_the_short_way_leads_nowhere_the_long_one_is_taken(
     solved: Solved, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    last, weights, options = continuation.SHORT_WAY[-1]
-    vain = continuation.SHORT_WAY[0], (last, weights, replace(options, max_iter=1))
-    monkeypatch.setattr(continuation, "SHORT_WAY", vain)
-    monkeypatch.setattr(continuation, "SERVES", 0.0)
-    projected = RefineStage._projected
+    last, weights, options = continuation.NEARBY_STEPS[-1]
+    vain = continuation.NEARBY_STEPS[0], (last, weights, replace(options, max_iter=1))
+    monkeypatch.setattr(continuation, "NEARBY_STEPS", vain)
+    monkeypatch.setattr(continuation, "NEARLY_EXACT", 0.0)
+    projected = RefineStage._restored
 
     def unless_vain(self: RefineStage, solution: Solution, *given: Any) -> Solution:
         return solution if solution.iterations == 1 else projected(self, solution, *given)
 
-    monkeypatch.setattr(RefineStage, "_projected", unless_vain)
+    monkeypatch.setattr(RefineStage, "_restored", unless_vain)
     before, farther = solved.refined.hand, farther_to_the_side(solved)
     model = solved.model
     again = Continuation(farther, before.contacts, (2,) * model.contacts, before.active).solve(
@@ -460,5 +462,5 @@ def test_where_the_short_way_leads_nowhere_the_long_one_is_taken(
     )
     assert again.exact
     names = [run.what for run in again.runs]
-    assert (names[0], names[-1]) == ("sparse firm", "exact")
+    assert (names[0], names[-1]) == ("sparse firm", "hard constraints")
     assert "sparse soft" in names

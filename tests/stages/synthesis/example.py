@@ -40,7 +40,7 @@ def ball_target(squeeze: float = SQUEEZE) -> Target:
         point=np.tile(model.patches, (keyframes, 1, 1)),
         force=np.tile(force, (samples, 1, 1)),
         active=np.ones((keyframes, 2), bool),
-        activity=np.ones((keyframes, 2)),
+        invariant=np.ones((keyframes, 2)),
         threshold=0.1,
         solution=made_up_solution({}),
         runs=(),
@@ -50,7 +50,7 @@ def ball_target(squeeze: float = SQUEEZE) -> Target:
 
 
 def foot(target: Target) -> float:
-    """Height of a finger's first joint, half extents."""
+    """Height of a finger's first joint, lengths."""
     return STAND * target.link_radius
 
 

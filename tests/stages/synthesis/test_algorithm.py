@@ -87,14 +87,14 @@ def test_the_best_hand_s_scores_decide(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_fingers_and_hands_that_fold_count_as_worse(monkeypatch: pytest.MonkeyPatch) -> None:
     # The last of three trials is the best, and the last of four hands: they fold.
-    def folding(_: Target, given: Synthesised) -> int:
+    def singular_fingers(_: Target, given: Synthesised) -> int:
         return int(given.fingers[0].base[0] == 2) if len(given.contacts) == 1 else 2 * (given.solution.objective == 6)
 
-    monkeypatch.setattr(algorithm, "folding", folding)
+    monkeypatch.setattr(algorithm, "singular_fingers", singular_fingers)
     orders = {}
     for share in (0.0, 0.4):
-        monkeypatch.setattr(algorithm, "FOLDED_FINGER", share)  # of scores 1.5, 0.75 and 0.5
-        monkeypatch.setattr(algorithm, "FOLDED_HAND", share / 2)
+        monkeypatch.setattr(algorithm, "SINGULAR_FINGER", share)  # of scores 1.5, 0.75 and 0.5
+        monkeypatch.setattr(algorithm, "SINGULAR_HAND", share / 2)
         made_up = MadeUp(monkeypatch, lambda h: [0.0, 0.0])
         found = search(ball_target()).run()
         orders[share] = made_up.combined[0], [c.hand.solution.objective for c in found.candidates]

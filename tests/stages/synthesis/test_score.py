@@ -7,7 +7,7 @@ import pytest
 
 from casadi_hands.stages.synthesis.score import finger_scores, worst_miss
 from casadi_hands.stages.synthesis.target import Target
-from casadi_hands.statics.joints import passive_projector
+from casadi_hands.statics.joints import structural_projector
 from casadi_hands.terms.finger import NULL_SPACE_DAMPING
 from tests.stages.synthesis.example import ball_target, foot, hand, pointing
 
@@ -28,7 +28,7 @@ def test_projector_is_the_svd_one_damped(joints: int) -> None:
     shares = np.zeros(3)
     shares[: len(singular)] = singular**2 / (singular**2 + 0.02**2)
     np.testing.assert_allclose(
-        passive_projector(jacobian, NULL_SPACE_DAMPING), left @ np.diag(1 - shares) @ left.T, atol=1e-12
+        structural_projector(jacobian, NULL_SPACE_DAMPING), left @ np.diag(1 - shares) @ left.T, atol=1e-12
     )
 
 
@@ -43,7 +43,7 @@ def test_tip_share_is_fifty_times_the_mean_squared_miss(target: Target) -> None:
     straight = hand([pointing(target, c, axes) for c in (0, 1)], (0, 1))
     np.testing.assert_allclose(target.points[:, 0, 1] - target.points[0, 0, 1], [0, 0.25, 0.5], atol=1e-9)
     misses = 50 * np.mean([0, 0.25**2, 0.5**2])
-    # Straight up, no joint lifts: the lift of 0.5 is passive in full; forces along y cost nothing.
+    # Straight up, no joint lifts: the lift of 0.5 is structural in full; forces along y cost nothing.
     np.testing.assert_allclose(finger_scores(target, straight), misses + 0.5, atol=0.02)
     assert (finger_scores(target, bent) > 0).all()
 
@@ -64,10 +64,10 @@ def test_a_finger_that_can_supply_all_scores_nothing_one_that_cannot_its_share_o
         seed.tips[:] = 0
     score = finger_scores(still, hand(able, (0, 1)))
     assert (score < 0.01).all()
-    # Upright with one joint about x they press, and what they lift, half the weight each, is passive.
+    # Upright with one joint about x they press, and what they lift, half the weight each, is structural.
     unable = finger_scores(still, hand([pointing(still, c, PUSH_ONLY) for c in (0, 1)], (0, 1)))
     np.testing.assert_allclose(unable, 0.5, atol=0.02)
-    # With one joint across the squeeze nothing is supplied: all that friction needs of it is passive too.
+    # With one joint across the squeeze nothing is supplied: all that friction needs of it is structural too.
     worse = finger_scores(still, hand([pointing(still, c, SIDEWAYS) for c in (0, 1)], (0, 1)))
     assert (worse > 1.0).all()
     # One of each: the able finger takes over what the other cannot, as far as balance of torques lets it.
@@ -88,7 +88,7 @@ def test_a_contact_counts_only_while_it_acts() -> None:
 
 
 def test_the_worst_miss_is_the_farthest_while_the_contact_acts() -> None:
-    # The contact moves away by 0.25 half extents a keyframe; keyframes are 0.3 s apart.
+    # The contact moves away by 0.25 lengths a keyframe; keyframes are 0.3 s apart.
     target = ball_target()
     straight = hand([pointing(target, c, PUSH_ONLY) for c in (0, 1)], (0, 1))
     np.testing.assert_allclose(worst_miss(target, straight, 0), (0.5, 0.6), atol=1e-9)

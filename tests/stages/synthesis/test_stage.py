@@ -27,7 +27,7 @@ from tests.stages.example import (
 )
 
 Array = np.ndarray
-MARGIN = 0.03  # clearance asked of what need not touch, half extents
+MARGIN = 0.03  # clearance asked of what need not touch, lengths
 JOINTS = (1, 2, 3)
 BENDS = (1.8, 1.8, 0.4)  # rad: two beyond the joint limits, one straight into the object
 TERMS = {

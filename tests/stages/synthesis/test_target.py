@@ -60,7 +60,7 @@ def test_scene_is_the_object_s_capsules_and_the_ground_s_plane_in_the_palm_frame
                 in_world = turns[3 * t].apply(capsule[end]) + positions[3 * t]
                 np.testing.assert_allclose(found[end], palm.inv().apply(in_world - position), atol=1e-12)
             assert found[6] == capsule[6]
-        on_ground = palm.inv().apply(np.array([0.4, -0.7, model.ground.height]) - position)
-        above = palm.inv().apply(np.array([0.1, 0.2, model.ground.height + 0.3]) - position)
+        on_ground = palm.inv().apply(np.array([0.4, -0.7, model.ground]) - position)
+        above = palm.inv().apply(np.array([0.1, 0.2, model.ground + 0.3]) - position)
         assert up[t] @ on_ground == pytest.approx(offset[t], abs=1e-12)
         assert up[t] @ above == pytest.approx(offset[t] + 0.3, abs=1e-12)

@@ -87,7 +87,7 @@ class Witness(ObjectWitness):
                     local = (1 - share) * capsule[:3] + share * capsule[3:6]
                     height = (self.objects[0][0][s] + self.objects[0][1][s].apply(local))[2]
                     total += float(g(0.02 + capsule[6] - palm_apart(self.in_palm(s, local), self.model.palm_radius)))
-                    total += float(g(self.model.ground.height + capsule[6] - height))
+                    total += float(g(self.model.ground + capsule[6] - height))
         return total
 
     def terms(self) -> dict[str, float]:
@@ -103,7 +103,7 @@ class Witness(ObjectWitness):
         now, before = self.angles_at(c, 0), self.angles_at(c, -1)
         tip = np.array([0, 0, 0, 0, 0, seed.lengths[-1], self.model.link_radius])
         for s in range(len(self.schedule.samples)):
-            point, active, force = self.points[1][s, c], self.activity[s, c], self.forces[""][s, c]
+            point, active, force = self.points[1][s, c], self.invariant[s, c], self.forces[""][s, c]
             size, touched = np.linalg.norm(force), self.in_palm(s, point)
             chain, rotation = finger.chain(now[s])
             on_link = rotation.T @ (touched - chain[-2])
@@ -136,7 +136,7 @@ class Witness(ObjectWitness):
                 points = [chain[0][1], *(p for a, b in chain[1:] for p in ((a + b) / 2, b))]
                 apart = [palm_apart(p, model.palm_radius) - radius for p in points]
                 joints = (chain[0][0], *(b for _, b in chain))
-                apart += [(palm.apply(p) + position)[2] - model.ground.height - radius for p in joints]
+                apart += [(palm.apply(p) + position)[2] - model.ground - radius for p in joints]
                 if len(chain) == 3:
                     apart.append(segments_apart(*chain[0], *chain[2]) - 2 * radius)
                 for capsule in model.primitives:
@@ -240,7 +240,7 @@ def test_a_solve_that_loses_its_way_is_tried_with_a_larger_barrier(
     barriers: list[float] = []
 
     def solve(start: Any, parameters: Any, options: Options, lower: Any, upper: Any) -> Any:
-        assert set(lower) == set(upper) == {"activity", "pose"}
+        assert set(lower) == set(upper) == {"invariant", "pose"}
         barriers.append(options.mu_init)
         return SimpleNamespace(violation=violations[len(barriers) - 1], number=len(barriers) - 1)
 

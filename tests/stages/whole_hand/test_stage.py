@@ -34,7 +34,7 @@ class Solved:
     result: WholeHand
 
     def in_palm(self, sample: int, point: np.ndarray) -> np.ndarray:
-        """A point of the object, object frame, seen from the palm; half extents."""
+        """A point of the object, object frame, seen from the palm; lengths."""
         turn = Rotation.from_rotvec(self.result.vector[sample]) * rotations(self.model.reference)
         in_world = turn.apply(point) + self.result.position[sample]
         palm = rotations(self.result.palm_quaternion[sample])

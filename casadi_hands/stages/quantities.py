@@ -1,0 +1,121 @@
+"""What the stages' variables and parameters are, in words and units, for those who read their programs.
+
+Lengths are in units of the characteristic length, forces in m·g; a pose is a position and a rotation vector from the
+reference orientation, both in the world.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from casadi_hands.nlp.program_index import Quantity
+
+_DISTURBED = "_perturbed"
+_POSE, _TORQUE, _CAPSULE = "length, rad", "m·g·length", "length"
+_QUANTITIES = {
+    # Variables.
+    "pose": Quantity("object's pose in the world, one row a keyframe or knot", _POSE),
+    "rate": Quantity("object's velocity (world) and angular velocity (object frame)", "length/s, rad/s"),
+    "point": Quantity("contact points on the object, object frame, three entries a contact", "length"),
+    "force": Quantity("contact forces on the object, three entries a contact; object frame", "m·g"),
+    "force_perturbed": Quantity("contact forces on the object under the disturbances; object frame", "m·g"),
+    "force_disturbed": Quantity("contact forces on the object under the disturbances; object frame", "m·g"),
+    "wrench": Quantity("the contacts' force and torque on the object; object frame", f"m·g, {_TORQUE}"),
+    "middle_torque": Quantity("the contacts' torque halfway between two knots; object frame", _TORQUE),
+    "activity": Quantity("contact invariants: 1 where a contact acts, 0 where it does not", ""),
+    "palm": Quantity("palm's offset from its given motion: translation and rotation vector, world", _POSE),
+    "base": Quantity("where the finger stands on the palm", "length"),
+    "lengths": Quantity("of the links", "length"),
+    "axes": Quantity("of the joints: two exponential coordinates each, from the frames' third columns", "rad"),
+    "angles": Quantity("of the joints, one row a keyframe or knot", "rad"),
+    "tips": Quantity("where on the fingertip's surface the contact is, for each time that it touches", "length"),
+    # The object and what acts on it.
+    "reference": Quantity("reference orientation: quaternion w, x, y, z", ""),
+    "step": Quantity("time step, or the time between two knots", "s"),
+    "gravity": Quantity("object's weight, world", "m·g"),
+    "inertia": Quantity("object's inertia, object frame, by columns", "m·length²"),
+    "inverse": Quantity("inverse of the inertia", "1/(m·length²)"),
+    "inertial": Quantity("characteristic length over gravity: turns length/s² into m·g", "s²"),
+    "external_force": Quantity("disturbing force, world", "m·g"),
+    "external_torque": Quantity("disturbing torque, world", _TORQUE),
+    "carried_acceleration": Quantity("of an object that goes as the palm does, world", "length/s²"),
+    "primitives": Quantity("object's capsules: start, end, radius", _CAPSULE),
+    "all_primitives": Quantity("object's capsules: start, end, radius", _CAPSULE),
+    "capsules": Quantity("the capsule that each contact is on: start, end, radius; object frame", _CAPSULE),
+    "capsule": Quantity("the capsule that the contact is on: start, end, radius; object frame", _CAPSULE),
+    "ground_capsule": Quantity("the capsule that stands on the ground; object frame", _CAPSULE),
+    # Contacts.
+    "friction": Quantity("coefficient of friction, or the part of it that may be used", ""),
+    "ground_friction": Quantity("the ground's, likewise", ""),
+    "sharpness": Quantity("exponent of the friction cone's penalty", "1/(m·g)"),
+    "patches": Quantity("where contacts are wanted; object frame", "length"),
+    "tie": Quantity("how strongly the contact is held to where it is wanted", ""),
+    "helper": Quantity("directions across the surface, from which tangents are made; object frame", ""),
+    "branch": Quantity("signs of the regularity to be kept: which way the finger bends", ""),
+    # Goals.
+    "targets": Quantity("goals' positions, world", "length"),
+    "vectors": Quantity("goals' rotation vectors, world", "rad"),
+    "goals": Quantity("goals' poses, world", _POSE),
+    "straight": Quantity("poses on the straight way between the goals", _POSE),
+    "tool": Quantity("the tool's tip, object frame", "length"),
+    "tool_path": Quantity("where the tool is to be, world", "length"),
+    "wanted_pose": Quantity("the motion that costs hold near to", _POSE),
+    "wanted_point": Quantity("contact points that costs hold near to; object frame", "length"),
+    "wanted_force": Quantity("contact forces that costs hold near to; object frame", "m·g"),
+    # The palm and other bodies.
+    "palm_position": Quantity("world", "length"),
+    "palm_quaternion": Quantity("world from palm: w, x, y, z", ""),
+    "palm_position_before": Quantity("one time step earlier, world", "length"),
+    "palm_quaternion_before": Quantity("one time step earlier, world from palm: w, x, y, z", ""),
+    "palm_position_between": Quantity("halfway between two knots, world", "length"),
+    "palm_quaternion_between": Quantity("halfway between two knots, world from palm: w, x, y, z", ""),
+    "palm_radius": Quantity("", "length"),
+    "ground_height": Quantity("world", "length"),
+    "up": Quantity("the ground's normal, palm frame", ""),
+    "ground": Quantity("the ground's offset along its normal, palm frame", "length"),
+    "clearance": Quantity("asked of object and palm", "length"),
+    "margin": Quantity("clearance asked of bodies that need not touch", "length"),
+    # Fingers.
+    "link_radius": Quantity("", "length"),
+    "radius": Quantity("of the links", "length"),
+    "shortest": Quantity("link that is allowed", "length"),
+    "longest": Quantity("link that is allowed", "length"),
+    "lowest": Quantity("joint angle that is allowed", "rad"),
+    "highest": Quantity("joint angle that is allowed", "rad"),
+    "frames": Quantity(
+        "of the joints: rotations (3, 3) by columns, the third the axis where its coordinates are 0", ""
+    ),
+    "target": Quantity("contact points to be followed, palm frame", "length"),
+    "active": Quantity("1 where the contact acts, 0 where it does not", ""),
+    "idle_step": Quantity("half the time between the keyframes around one in the air", "s"),
+    "keyframe_step": Quantity("mean time between keyframes", "s"),
+    "wanted_base": Quantity("where costs hold the finger's base near to", "length"),
+    "wanted_lengths": Quantity("the links' lengths that costs hold near to", "length"),
+    "wanted_axes": Quantity("the joints' axes that costs hold near to", "rad"),
+}
+
+
+def quantities(names: Iterable[str], contacts: Sequence[str]) -> dict[str, Quantity]:
+    """What variables and parameters of a stage are; what is not known is left out.
+
+    Args:
+        names: in the stage's problem.
+        contacts: names of the fingers' contacts; a variable of one of them ends with its index.
+    """
+    found = {name: _quantity(name, contacts) for name in names}
+    return {name: quantity for name, quantity in found.items() if quantity is not None}
+
+
+def _quantity(name: str, contacts: Sequence[str]) -> Quantity | None:
+    if name.startswith("weight."):
+        return Quantity(f"weight of the term {name.removeprefix('weight.')}", "")
+    if name.startswith("near."):
+        of = _quantity(name.removeprefix("near."), contacts)
+        return of and Quantity(f"where the proximal term is least: {of.about}", of.unit)
+    kind = name.rstrip("0123456789")
+    found = _QUANTITIES.get(kind) or _QUANTITIES.get(kind.removesuffix(_DISTURBED))
+    if found is None or kind == name:
+        return found
+    index = int(name.removeprefix(kind))
+    owner = f"finger '{contacts[index]}'" if index < len(contacts) else "the ground"
+    return Quantity(f"{owner}: {found.about}", found.unit)
