@@ -179,8 +179,8 @@ class Cylinder(_Round):
     def distance(self, point: np.ndarray) -> np.ndarray:
         """See `Shape`."""
         beyond, _, _ = self._beyond(point)
-        inside: np.ndarray = np.minimum(beyond.max(axis=-1), 0.0)
-        return np.linalg.norm(np.maximum(beyond, 0.0), axis=-1) + inside
+        outside, inside = np.linalg.norm(np.maximum(beyond, 0.0), axis=-1), np.minimum(beyond.max(axis=-1), 0.0)
+        return np.asarray(outside + inside)
 
     def normal(self, point: np.ndarray) -> np.ndarray:
         """See `Shape`; beyond an edge, away from it; zero on the axis where the side is nearest."""

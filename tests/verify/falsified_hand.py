@@ -222,7 +222,10 @@ HIDDEN: Cases = {
         r"holds 'object', 'wing'",
     ),
     "two objects": (added(OBJECT, ".", f"<link name='object'>{MASS}{BALL}</link>"), r"two <link name=\"object\">"),
-    "an object without geometry": (removed(OBJECT, "link/collision"), r"no link 'object' made of spheres, capsules and cylinders"),
+    "an object without geometry": (
+        removed(OBJECT, "link/collision"),
+        r"no link 'object' made of spheres, capsules and cylinders",
+    ),
     "a smaller object": (
         edited(OBJECT, ".//*[@radius]", lambda e, p: e.set("radius", "0.01"), every=True),
         r"shapes: object\.urdf has not the shapes of task\.yaml",
