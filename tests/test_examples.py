@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import subprocess
 import sys
 from importlib.metadata import distribution, files
@@ -11,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from packaging.requirements import Requirement
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.export.arrays import save_motion
@@ -25,15 +25,17 @@ PLAYER = Path(__file__).parents[1] / "examples" / "play.py"
 @pytest.fixture(scope="module")
 def elsewhere(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """The environment of a Python that has numpy and mujoco, with what they need, and nothing else."""
-    place, wanted, seen = tmp_path_factory.mktemp("packages"), ["numpy", "mujoco"], set()
+    place, seen = tmp_path_factory.mktemp("packages"), set()
+    wanted = [Requirement("numpy"), Requirement("mujoco")]
     while wanted:
-        name = wanted.pop()
-        if name in seen:
+        want = wanted.pop()
+        if str(want) in seen:
             continue
-        seen.add(name)
-        for line in distribution(name).requires or []:
-            if "extra ==" not in line:
-                wanted.append(re.match(r"[\w.-]+", line)[0])  # type: ignore[index]
+        seen.add(str(want))
+        name = want.name
+        for each in map(Requirement, distribution(name).requires or []):
+            if each.marker is None or any(each.marker.evaluate({"extra": extra}) for extra in ("", *want.extras)):
+                wanted.append(each)
         for file in files(name) or []:
             top, root = file.parts[0], Path(str(file.locate())).parents[len(file.parts) - 1]
             if top not in ("..", "__pycache__") and not (place / top).exists():
