@@ -15,7 +15,6 @@ from tests.stages.example import everything
 
 Array = np.ndarray
 DURATION = 1.5
-A, B, C, D = np.random.default_rng(0).uniform(-0.5, 0.5, (4, 3))
 
 
 def wave(one: Array, two: Array, t: float) -> Array:
@@ -24,22 +23,23 @@ def wave(one: Array, two: Array, t: float) -> Array:
     return one * (1 - np.cos(w * t)) + two * (1 - np.cos(2 * w * t))
 
 
-def test_rates_and_wrenches_are_those_of_newton_and_euler() -> None:
+def test_rates_and_wrenches_are_those_of_newton_and_euler(rng: np.random.Generator) -> None:
+    a, b, c, d = rng.uniform(-0.5, 0.5, (4, 3))
     _, model = everything()
     model = replace(model, schedule=Schedule.of([0, DURATION], DURATION, 0, 0.01))
     times, w = model.schedule.samples, np.pi / DURATION
     reference = Rotation.from_quat(model.reference, scalar_first=True)
-    position, vector = (np.array([wave(*ends, t) for t in times]) for ends in ((A, B), (C, D)))
+    position, vector = (np.array([wave(*ends, t) for t in times]) for ends in ((a, b), (c, d)))
     rates, wrenches = rates_and_wrenches(model, position, vector)
 
     def spin(t: float, h: float = 1e-4) -> Array:
-        before, after = (Rotation.from_rotvec(wave(C, D, t + k * h)) * reference for k in (-1, 1))
+        before, after = (Rotation.from_rotvec(wave(c, d, t + k * h)) * reference for k in (-1, 1))
         return (before.inv() * after).as_rotvec() / (2 * h)
 
     for t, rate, wrench in zip(times, rates, wrenches, strict=True):
-        turn = Rotation.from_rotvec(wave(C, D, t)) * reference
-        speed = A * w * np.sin(w * t) + B * 2 * w * np.sin(2 * w * t)
-        acceleration = A * w**2 * np.cos(w * t) + B * 4 * w**2 * np.cos(2 * w * t)
+        turn = Rotation.from_rotvec(wave(c, d, t)) * reference
+        speed = a * w * np.sin(w * t) + b * 2 * w * np.sin(2 * w * t)
+        acceleration = a * w**2 * np.cos(w * t) + b * 4 * w**2 * np.cos(2 * w * t)
         omega, alpha = spin(t), (spin(t + 1e-3) - spin(t - 1e-3)) / 2e-3
         np.testing.assert_allclose(rate, [*speed, *omega], atol=1e-4)
         force = turn.inv().apply(model.units.inertial * acceleration - [0, 0, -1])
