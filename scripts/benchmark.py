@@ -272,7 +272,7 @@ def evaluations(task_file: Path) -> list[list[str]]:
         for function in FUNCTIONS:
             whole, loop, _ = seconds.get(function, (0.0, 0.0, 0))
             cells.append(f"{1e3 * whole:.2f}, {whole / loop:.2f}" if loop else NOTHING)
-        spent = sum(calls * np.array([whole, loop]) for whole, loop, calls in seconds.values())
+        spent = np.sum([(calls * whole, calls * loop) for whole, loop, calls in seconds.values()], axis=0)
         everything += spent
         rows.append([name, stage, *cells, f"{spent[0] / spent[1]:.2f}"])
     return [*rows, [name, "all", *[NOTHING] * len(FUNCTIONS), f"{everything[0] / everything[1]:.2f}"]]

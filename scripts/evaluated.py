@@ -116,16 +116,17 @@ def _optimised() -> Any:
 
 def _seconds(function: ca.Function, inputs: Sequence[Vector]) -> float:
     """Of one call, the least of some repeated measurements."""
+    buffer: Any  # CasADi's types ask for a size that its methods do not take
     buffer, call = function.buffer()
     arrays = [np.ascontiguousarray(each, float) for each in inputs]
     results = [np.zeros(function.nnz_out(i)) for i in range(function.n_out())]
     for index, array in enumerate(arrays):
         assert array.size == function.nnz_in(index)
         if array.size:
-            buffer.set_arg(index, memoryview(array))
+            buffer.set_arg(index, array.data)
     for index, array in enumerate(results):
         if array.size:
-            buffer.set_res(index, memoryview(array))
+            buffer.set_res(index, array.data)
     call()
     best = np.inf
     for _ in range(REPEATS):

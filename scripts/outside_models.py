@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -98,19 +99,20 @@ def _yourdfpy(
 
 def _drake(file: Path, angles: np.ndarray, joints: list[str], links: list[str], tips: dict[str, np.ndarray]) -> Facts:
     plant = MultibodyPlant(0.0)
-    (hand,) = Parser(plant).AddModels(str(file))
+    (hand,) = Parser(plant).AddModels(file)
     plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("palm"))
     plant.Finalize()
     driven = [plant.get_joint(k).name() for k in plant.GetJointIndices(hand) if plant.get_joint(k).num_positions()]
     assert driven == joints
     assert plant.num_actuators() == len(joints)
     context, places = plant.CreateDefaultContext(), []
+    given: dict[str, Any] = dict(tips)  # Drake's types name an array's number type where its shape belongs
     for row in angles:
         plant.SetPositions(context, row)
         places.append(
             [
                 plant.CalcPointsPositions(context, plant.GetFrameByName(name), point, plant.world_frame()).ravel()
-                for name, point in tips.items()
+                for name, point in given.items()
             ]
         )
     inertias = [plant.GetBodyByName(name).default_spatial_inertia() for name in links]

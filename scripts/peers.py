@@ -163,12 +163,13 @@ def _interpreted() -> Iterator[None]:
 
 def _scipy_attempt(name: str, gradient: ca.Function, posed: Posed, limit: float) -> Attempt:
     trace: Trace = []
+    buffer: Any  # CasADi's types ask for a size that its methods do not take
     buffer, call = gradient.buffer()
     x, value, slope = np.array(posed.start), np.zeros(1), np.zeros(len(posed.start))
     for index, array in enumerate((x, posed.parameters)):
-        buffer.set_arg(index, memoryview(array))
+        buffer.set_arg(index, array.data)
     for index, array in enumerate((value, slope)):
-        buffer.set_res(index, memoryview(array))
+        buffer.set_res(index, array.data)
     unbounded = name == "BFGS"
     boxed = np.isfinite(posed.upper - posed.lower) & unbounded
     half = np.where(boxed, posed.upper - posed.lower, 0.0) / 2

@@ -18,6 +18,7 @@ from casadi_hands.stages.floating.stage import FloatingStage
 from casadi_hands.stages.refine.stage import RefineStage
 from casadi_hands.stages.synthesis.stage import SynthesisStage
 from casadi_hands.stages.whole_hand.stage import WholeHandStage
+from casadi_hands.verify import audit_files, run_replays
 
 KINDS = ("building", "value", "gradient", "Jacobian", "Hessian", "rest of IPOPT", "replays", "audits")
 CALLED = {"value": ("nlp_f", "nlp_g"), "gradient": ("nlp_grad_f",), "Jacobian": ("nlp_jac_g",)}
@@ -49,8 +50,9 @@ class Ledger:
         patches = [patch.object(stage, "__init__", self._timed(stage.__init__)) for stage in stages]
         patches += [patch.object(Solver, "nlpsol", self._timed(Solver.nlpsol))]
         patches += [patch.object(Solver, "solve", self._booked(Solver.solve))]
-        patches += [patch.object(judge, "run_replays", self._timed(judge.run_replays, "replays"))]
-        patches += [patch.object(judge, "audit_files", self._timed(judge.audit_files, "audits", "audit"))]
+        # Where they are used, not where they are made: that name is what is looked up.
+        patches += [patch.object(judge, "run_replays", self._timed(run_replays, "replays"))]
+        patches += [patch.object(judge, "audit_files", self._timed(audit_files, "audits", "audit"))]
         for each in patches:
             each.start()
         try:

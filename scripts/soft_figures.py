@@ -139,7 +139,8 @@ def _slid(folder: Folder, placed: Placements, link: str, c: int, k: int) -> floa
 
     def carried(body: str, point: np.ndarray) -> np.ndarray:
         before, after = (rotation @ point + position for rotation, position in (at(body, k), at(body, k + 1)))
-        return after - before
+        way: np.ndarray = after - before
+        return way
 
     def at(body: str, sample: int) -> tuple[np.ndarray, np.ndarray]:
         rotations, positions = placed[body]
@@ -148,9 +149,9 @@ def _slid(folder: Folder, placed: Placements, link: str, c: int, k: int) -> floa
     ends = (k, k + 1)
     on_object = [carried("object", motion.contact_point_object[i, c]) for i in ends]
     on_link = [carried(link, motion.contact_point_link[i, c]) for i in ends]
-    slid = (sum(on_object) - sum(on_link)) / 2
-    normal = sum(surface_normals(folder, placed, i, c)[0] for i in ends)
-    normal = normal / np.linalg.norm(normal)
+    slid = (np.sum(on_object, axis=0) - np.sum(on_link, axis=0)) / 2
+    normal = np.sum([surface_normals(folder, placed, i, c)[0] for i in ends], axis=0)
+    normal /= np.linalg.norm(normal)
     return float(np.linalg.norm(slid - (slid @ normal) * normal))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -68,7 +68,7 @@ def stills(design: Design, times: list[float]) -> list[bytes]:
     samples = [int(np.abs(timeline.time - time).argmin()) for time in times]
     scenes = [_bodies(design, timeline, k) for k in samples]
     arrows = [_arrows(design, timeline, k) for k in samples]
-    everything = [*_goals(design), *(body for row in (*scenes, *arrows) for body in row)]
+    everything = [*_goals(design), *chain.from_iterable(scenes), *chain.from_iterable(arrows)]
     camera = look(eye_towards(design.task.palm.rotation[:, 2]), _extent(everything), SIZE)
     ground = design.task.ground
     pictures = []
@@ -103,9 +103,11 @@ def _bodies(design: Design, timeline: Timeline, sample: int) -> list[Capsule | D
 def _object_at(design: Design, pose: np.ndarray, color: tuple[float, float, float], checked: bool) -> list[Capsule]:
     """The object's primitives at a pose (4, 4)."""
     checks = pose if checked else None
-    ends = ([pose[:3, :3] @ end + pose[:3, 3] for end in shape.segment] for shape in design.task.object.shapes)
-    radii = (shape.radius for shape in design.task.object.shapes)
-    return [Capsule(*pair, radius, color, checks=checks) for pair, radius in zip(ends, radii, strict=True)]
+    bodies = []
+    for shape in design.task.object.shapes:
+        start, end = (pose[:3, :3] @ each + pose[:3, 3] for each in shape.segment)
+        bodies.append(Capsule(start, end, shape.radius, color, checks=checks))
+    return bodies
 
 
 def _extent(bodies: list[Capsule | Disc]) -> np.ndarray:

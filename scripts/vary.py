@@ -206,7 +206,8 @@ def scaled_turn(first: np.ndarray, vector: np.ndarray, factor: float) -> np.ndar
     About one axis, turns beyond 180 degrees keep their way round.
     """
     if np.linalg.norm(np.cross(first, vector)) <= 1e-9 * np.linalg.norm(first) * np.linalg.norm(vector):
-        return first + factor * (vector - first)
+        straight: np.ndarray = first + factor * (vector - first)
+        return straight
     start = Turn.from_rotvec(first)
     between = (Turn.from_rotvec(vector) * start.inv()).as_rotvec()
     turned: np.ndarray = (Turn.from_rotvec(factor * between) * start).as_rotvec()

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import casadi as ca
 import coal
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.kinematics.morphology import FingerSeed
@@ -14,7 +15,7 @@ from casadi_hands.nlp import Kernel
 from tests.stages.example import nearest_on_axis
 
 Array = np.ndarray
-Values = Mapping[str, object]
+Values = Mapping[str, ArrayLike]
 STEP = 0.1
 STILL = [1.0, 0.0, 0.0, 0.0]
 
@@ -71,7 +72,8 @@ class Place:
 
     @property
     def pose(self) -> Array:
-        return np.r_[self.position, self.vector]
+        pose: Array = np.r_[self.position, self.vector]
+        return pose
 
     @property
     def turn(self) -> Rotation:
@@ -83,10 +85,12 @@ class Place:
         return {"reference": quaternions[0], "palm_position": self.palm_position, "palm_quaternion": quaternions[1]}
 
     def in_world(self, point: Array) -> Array:
-        return self.turn.apply(point) + self.position
+        moved: Array = self.turn.apply(point) + self.position
+        return moved
 
     def in_palm(self, point: Array) -> Array:
-        return self.palm.inv().apply(self.in_world(point) - self.palm_position)
+        seen: Array = self.palm.inv().apply(self.in_world(point) - self.palm_position)
+        return seen
 
 
 def surface(point: Array, capsule: Array) -> tuple[float, Array]:

@@ -148,7 +148,8 @@ def spline_at(knots: Array, values: Array, times: Array) -> Array:
     slopes[1:-1] = (values[2:] - values[:-2]) / (knots[2:] - knots[:-2])[:, None]
     mirrored = np.abs(times - knots[0]) + knots[0]
     mirrored = knots[-1] - np.abs(knots[-1] - mirrored)
-    return CubicHermiteSpline(knots, values, slopes)(mirrored)
+    found: Array = CubicHermiteSpline(knots, values, slopes)(mirrored)
+    return found
 
 
 def linear_at(knots: Array, values: Array, times: Array) -> Array:
@@ -177,7 +178,8 @@ def cone(force: Array, inward: Array, friction: float, sharpness: float = 5.0) -
 def nearest_on_axis(point: Array, capsule: Array) -> Array:
     start, along = capsule[:3], capsule[3:6] - capsule[:3]
     length = along @ along
-    return start + (np.clip((point - start) @ along / length, 0, 1) if length else 0.0) * along
+    nearest: Array = start + (np.clip((point - start) @ along / length, 0, 1) if length else 0.0) * along
+    return nearest
 
 
 def project(point: Array, capsule: Array) -> tuple[Array, Array]:
@@ -206,13 +208,15 @@ def palm_apart(point: Array, radius: float) -> float:
     """Signed distance of a point from a disc's body, which fills z < 0 below it."""
     height, beyond = point[2], np.hypot(point[0], point[1]) - radius
     if height <= 0 and beyond <= 0:
-        return max(height, beyond)
+        above: float = max(height, beyond)
+        return above
     return float(np.hypot(max(height, 0), max(beyond, 0)))
 
 
 def quaternion_product(a: Array, b: Array) -> Array:
     w, v = a[0], a[1:]
-    return np.r_[w * b[0] - v @ b[1:], w * b[1:] + b[0] * v + np.cross(v, b[1:])]
+    product: Array = np.r_[w * b[0] - v @ b[1:], w * b[1:] + b[0] * v + np.cross(v, b[1:])]
+    return product
 
 
 @dataclass
@@ -252,7 +256,8 @@ class Motion:
     @property
     def acceleration(self) -> Array:
         before, now, after = (self.at(k)[0] for k in (-1, 0, 1))
-        return (after - 2 * now + before) / self.model.schedule.step**2
+        second: Array = (after - 2 * now + before) / self.model.schedule.step**2
+        return second
 
     @property
     def inertial_torque(self) -> Array:
@@ -309,7 +314,8 @@ class PinFinger:
 
     def point(self, angles: Array, on_link: Array) -> Array:
         points, rotation = self.chain(angles)
-        return points[-2] + rotation @ on_link
+        point: Array = points[-2] + rotation @ on_link
+        return point
 
 
 def unsupplied(jacobian: Array, force: Array, damping: float = 0.02) -> float:
@@ -324,7 +330,9 @@ def unsupplied(jacobian: Array, force: Array, damping: float = 0.02) -> float:
 def torques(jacobian: Array, force: Array) -> Array:
     """α of eq. A.5 by damped least squares on X = J / ‖J_i‖²."""
     x = jacobian / (jacobian**2).sum(axis=0)
-    return np.linalg.lstsq(np.vstack([x, 1e-3 * np.eye(x.shape[1])]), np.r_[force, np.zeros(x.shape[1])], rcond=None)[0]
+    damped, right = np.vstack([x, 1e-3 * np.eye(x.shape[1])]), np.r_[force, np.zeros(x.shape[1])]
+    alpha: Array = np.linalg.lstsq(damped, right, rcond=None)[0]
+    return alpha
 
 
 def doubling_each_weight(

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from falsify import (
+
+from tests.verify.falsify import (
     DISTURBED,
     HAND,
     NPZ,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from falsify import (
+from tests.verify.falsify import (
     BODY,
     SCENE,
     THING,

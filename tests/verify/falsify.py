@@ -54,8 +54,11 @@ def text(file: str, old: str, new: str, count: int = 1) -> Falsify:
 
 def whole(file: str, content: str | bytes) -> Falsify:
     """Write a whole file."""
-    data = content if isinstance(content, bytes) else content.encode()
-    return lambda folder: (folder / file).write_bytes(data) and None
+
+    def run(folder: Path) -> None:
+        (folder / file).write_bytes(content if isinstance(content, bytes) else content.encode())
+
+    return run
 
 
 def attribute(file: str, path: str, name: str, value: str | Callable[[str], str] | None) -> Falsify:
@@ -172,7 +175,7 @@ def only(element: ElementTree.Element, xml: str) -> None:
     element[:] = [ElementTree.fromstring(xml)]
 
 
-def reversed(element: ElementTree.Element) -> None:
+def reordered(element: ElementTree.Element) -> None:
     """Give an element's attributes in another order."""
     items = list(element.items())
     element.attrib.clear()

@@ -44,7 +44,8 @@ class Scene:
         (directory / "object.urdf").write_text(object_urdf(self.task))
         (directory / "scene.xml").write_text(scene_mjcf(self.task, self.hand, motion))
         given = {name: getattr(motion, name) for name in Motion.__dataclass_fields__}
-        np.savez(directory / "motion.npz", **{name: np.asarray(a) for name, a in given.items() if a is not None})
+        arrays: dict[str, Any] = {name: np.asarray(a) for name, a in given.items() if a is not None}
+        np.savez(directory / "motion.npz", **arrays)
         record = result(self.task, self.hand, len(motion.time))
         (directory / "result.json").write_text(json.dumps({**record, **self.changes}))
         return directory
@@ -383,7 +384,8 @@ def integrate(
 
 
 def _quaternions(states: np.ndarray) -> np.ndarray:
-    return Rotation.from_matrix(states[:, 6:15].reshape(-1, 3, 3)).as_quat(scalar_first=True)
+    quaternions: np.ndarray = Rotation.from_matrix(states[:, 6:15].reshape(-1, 3, 3)).as_quat(scalar_first=True)
+    return quaternions
 
 
 def _integrated(
@@ -441,7 +443,8 @@ def _grasp(task: Task) -> tuple[Hand, np.ndarray, np.ndarray]:
 
 
 def _lean(radial: np.ndarray, angle: float) -> np.ndarray:
-    return np.cos(angle) * np.array([0.0, 0.0, 1.0]) + np.sin(angle) * radial
+    leaning: np.ndarray = np.cos(angle) * np.array([0.0, 0.0, 1.0]) + np.sin(angle) * radial
+    return leaning
 
 
 def plain(task: Task, time: np.ndarray, links: int = 1, **arrays: Any) -> Scene:

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fixture import SPHERE, Scene, carried, object_urdf, plain, read_task
 
 from casadi_hands.errors import DesignError
 from casadi_hands.task import task_to_yaml
 from casadi_hands.verify import audit
+from tests.verify.fixture import SPHERE, Scene, carried, object_urdf, plain, read_task
 
 
 @pytest.fixture(scope="module")

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fixture import SPHERE, TIP, plain, read_task
 
 from casadi_hands.verify.figures.clearance import body_pairs, joint_figures, penetration_figure
 from casadi_hands.verify.figures.dynamics import shoot
 from casadi_hands.verify.reading.folder import Folder, read_folder
 from casadi_hands.verify.trajectory import build_trajectory
+from tests.verify.fixture import SPHERE, TIP, plain, read_task
 
 TIME = np.linspace(0.0, 1.0, 11)
 

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fixture import SPHERE, TIP, geared, plain, read_task
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.verify.figures.contact import (
@@ -20,6 +19,7 @@ from casadi_hands.verify.figures.contact import (
 from casadi_hands.verify.figures.dynamics import shoot
 from casadi_hands.verify.reading.folder import Folder, read_folder
 from casadi_hands.verify.trajectory import build_trajectory, sample_placements
+from tests.verify.fixture import SPHERE, TIP, geared, plain, read_task
 
 TIME = np.linspace(0.0, 1.0, 11)
 GROUND = (

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from falsify import OBJECT, SCENE, Falsify, attribute, edited, record
-from fixture import Scene, carried
 
 from casadi_hands.verify import audit_files, replay
 from casadi_hands.verify.audit import audit
 from casadi_hands.verify.reading.folder import read_folder
 from casadi_hands.verify.shapes import Cylinder
+from tests.verify.falsify import OBJECT, SCENE, Falsify, attribute, edited, record
+from tests.verify.fixture import Scene, carried
 
 GEOM = ".//body[@name='object']/geom"
 

@@ -15,7 +15,6 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 import pytest
-from fixture import MASS, RADIUS, Scene, carried
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.errors import DesignError, HandsError
@@ -26,6 +25,7 @@ from casadi_hands.verify.reading.folder import Folder, read_folder
 from casadi_hands.verify.replays.drake import DrakeSimulation, load_drake
 from casadi_hands.verify.replays.drake_scene import PATCH, PRESS
 from casadi_hands.verify.replays.simulation import Plan
+from tests.verify.fixture import MASS, RADIUS, Scene, carried
 
 WEIGHT, FLOOR, GROUND_FRICTION = MASS * 9.81, -1.0, 0.3
 LYING = (np.pi / 2, 0.0, 0.0)

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fixture import SPHERE, plain, read_task
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.verify.figures.dynamics import between_residual, sample_residual, shoot
 from casadi_hands.verify.reading.folder import Folder, read_folder
+from tests.verify.fixture import SPHERE, plain, read_task
 
 TIME = np.linspace(0.0, 1.0, 11)
 CAPSULE = "gravity: [0, 0, 0]" + SPHERE.replace(

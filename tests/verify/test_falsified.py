@@ -10,24 +10,6 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from falsified_files import DISAGREEMENTS
-from falsified_hand import HAND_AGAINST_TASK, HIDDEN
-from falsified_motion import DISTURBANCES, NO_NUMBERS
-from falsified_scene import IN_THE_SCENE
-from falsify import (
-    DISTURBED,
-    HAND,
-    LINK,
-    SCENE,
-    Falsify,
-    added,
-    arrays,
-    edited,
-    removed,
-    task,
-    text,
-)
-from fixture import Scene, carried
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.errors import DesignError, TaskError
@@ -37,6 +19,25 @@ from casadi_hands.verify.checks.structure import structure_problems
 from casadi_hands.verify.figures.dynamics import shoot
 from casadi_hands.verify.reading.folder import read_folder
 from casadi_hands.verify.trajectory import build_trajectory
+from tests.verify.falsified_files import DISAGREEMENTS
+from tests.verify.falsified_hand import HAND_AGAINST_TASK, HIDDEN
+from tests.verify.falsified_motion import DISTURBANCES, NO_NUMBERS
+from tests.verify.falsified_scene import IN_THE_SCENE
+from tests.verify.falsify import (
+    DISTURBED,
+    HAND,
+    LINK,
+    SCENE,
+    Falsify,
+    added,
+    arrays,
+    edited,
+    removed,
+    reordered,
+    task,
+    text,
+)
+from tests.verify.fixture import Scene, carried
 
 MORE = """
 perturbations: [{from: 0.45, to: 0.85, force: [0.1, 0, -0.3]}, {from: 1.22, to: 1.28, torque: [0, 0, 0.002]}]
@@ -139,8 +140,8 @@ def test_an_object_that_no_hand_touches_is_not_certified(
     "vary",
     [
         edited(HAND, LINK, lambda e, p: e.insert(0, ElementTree.Comment("the proximal one"))),
-        edited(HAND, ".//limit", lambda e, p: reversed(e), every=True),
-        edited(SCENE, ".//geom", lambda e, p: reversed(e), every=True),
+        edited(HAND, ".//limit", lambda e, p: reordered(e), every=True),
+        edited(SCENE, ".//geom", lambda e, p: reordered(e), every=True),
         edited(HAND, ".", lambda e, p: e.__setitem__(slice(None), sorted(e, key=lambda child: child.tag))),
         edited(SCENE, "worldbody//geom", lambda e, p: e.set("rgba", "1 0 0 1"), every=True),
         added(SCENE, "worldbody", "<camera name='above' pos='0 0 1'/>"),

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fixture import SPHERE, plain, read_task
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.verify.figures.goals import goal_figures
 from casadi_hands.verify.reading.folder import read_folder
+from tests.verify.fixture import SPHERE, plain, read_task
 
 TIME = np.linspace(0.0, 1.0, 11)
 

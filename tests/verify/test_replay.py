@@ -10,7 +10,6 @@ from types import SimpleNamespace
 import mujoco
 import numpy as np
 import pytest
-from fixture import Scene, carried
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.errors import DesignError, HandsError
@@ -19,6 +18,7 @@ from casadi_hands.verify import Perturbation, audit_files, replay, replay_many
 from casadi_hands.verify.reading.folder import read_folder
 from casadi_hands.verify.replays.perturb import draw_perturbation
 from casadi_hands.verify.replays.simulation import SUPPORT, Simulation, load_mujoco
+from tests.verify.fixture import Scene, carried
 
 
 def _write(scene: Scene, directory: Path) -> Path:

@@ -12,11 +12,11 @@ from types import SimpleNamespace
 import mujoco
 import numpy as np
 import pytest
-from fixture import carried
 
 from casadi_hands.errors import HandsError
 from casadi_hands.export.mjcf import scene_mjcf
 from casadi_hands.verify.replays.video import FRAMES, SIZE, film
+from tests.verify.fixture import carried
 
 ROOT = Path(__file__).parents[2]
 PROGRAM = """

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fixture import SPHERE, carried, plain, read_task
 
 from casadi_hands.verify.figures.wrench import (
     disturbance_figure,
@@ -17,6 +16,7 @@ from casadi_hands.verify.figures.wrench import (
 )
 from casadi_hands.verify.reading.folder import Folder, read_folder
 from casadi_hands.verify.trajectory import place_links, sample_placements
+from tests.verify.fixture import SPHERE, carried, plain, read_task
 
 TIME = np.linspace(0.0, 1.0, 11)
 
