@@ -1,36 +1,21 @@
-"""A design for other programs: each target writes a file or a folder that they read as it is."""
+"""A design for other programs: each target writes a file or a folder that they read as it is.
+
+A module of this folder that names its targets in ``TARGETS`` is found by itself.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
-from typing import NamedTuple
+from pkgutil import iter_modules
 
 from casadi_hands.errors import HandsError
-from casadi_hands.export.targets.files import write_csv, write_urdf
-from casadi_hands.export.targets.ros2 import write_ros2
 from casadi_hands.export.targets.source import Source
-from casadi_hands.export.targets.usd import write_usd
+from casadi_hands.export.targets.target import Target
 
-
-class Target(NamedTuple):
-    """One kind of export.
-
-    Attributes:
-        write: writes a design to a path, and returns what it wrote.
-        default: where, within the folder ``export`` of the result folder, unless told otherwise.
-    """
-
-    write: Callable[[Source, Path], Path]
-    default: str
-
-
-TARGETS = {
-    "csv": Target(write_csv, "motion.csv"),
-    "ros2": Target(write_ros2, "ros2"),
-    "urdf": Target(write_urdf, "hand.urdf"),
-    "usd": Target(write_usd, "usd"),
-}
+_MODULES = [import_module(f"{__name__}.{module.name}") for module in iter_modules(__path__)]
+_FOUND: dict[str, Target] = {name: each for module in _MODULES for name, each in getattr(module, "TARGETS", {}).items()}
+TARGETS = dict(sorted(_FOUND.items()))
 
 
 def export_design(directory: str | Path, target: str, out: str | Path | None = None) -> Path:

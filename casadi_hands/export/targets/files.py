@@ -7,6 +7,7 @@ from pathlib import Path
 from casadi_hands.errors import HandsError
 from casadi_hands.export.table import motion_table
 from casadi_hands.export.targets.source import Source
+from casadi_hands.export.targets.target import Target
 
 
 def write_csv(source: Source, out: Path) -> Path:
@@ -48,3 +49,6 @@ def _write(path: Path, text: str) -> Path:
     except OSError as error:
         raise HandsError(f"{path}: cannot write the export here: {error}") from error
     return path
+
+
+TARGETS = {"csv": Target(write_csv, "motion.csv"), "urdf": Target(write_urdf, "hand.urdf")}

@@ -31,6 +31,7 @@ from casadi_hands.export.markup import document, number
 from casadi_hands.export.table import motion_table
 from casadi_hands.export.targets import ros2_texts
 from casadi_hands.export.targets.source import Source, write_texts
+from casadi_hands.export.targets.target import Target
 from casadi_hands.problem.motors import Motor, joint_motors
 
 _APPROACH_SHARE = 0.5  # of the joints' speed limit, on the mean, from zero angles to the start
@@ -197,3 +198,6 @@ def _yaml(value: dict[str, Any]) -> str:
     stream = io.StringIO()
     yaml.dump(value, stream)
     return stream.getvalue()
+
+
+TARGETS = {"ros2": Target(write_ros2, "ros2")}

@@ -22,6 +22,7 @@ from scipy.spatial.transform import Rotation
 from casadi_hands.errors import HandsError
 from casadi_hands.export.markup import document
 from casadi_hands.export.targets.source import Source, write_texts
+from casadi_hands.export.targets.target import Target
 from casadi_hands.export.urdf import object_urdf
 from casadi_hands.problem.motors import Motor, joint_motors
 
@@ -202,3 +203,6 @@ def _text(layer: Any) -> str:
     layer.comment = _COMMENT
     text: str = layer.ExportToString()
     return text
+
+
+TARGETS = {"usd": Target(write_usd, "usd")}
