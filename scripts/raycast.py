@@ -5,6 +5,7 @@ All vectors are in one world frame and one unit of length.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,7 +95,12 @@ def draw(camera: Camera, bodies: list[Capsule | Disc], ground: float | None = No
 
 
 def overlay(
-    picture: np.ndarray, distance: np.ndarray, camera: Camera, bodies: list[Capsule], opacity: float, through: bool
+    picture: np.ndarray,
+    distance: np.ndarray,
+    camera: Camera,
+    bodies: Sequence[Capsule | Disc],
+    opacity: float,
+    through: bool,
 ) -> None:
     """Draw translucent bodies over a picture, each pixel once.
 

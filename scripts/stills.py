@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 from camera import Camera, look, png
 from raycast import Capsule, Disc, draw, overlay
+from scipy.spatial.transform import Rotation
 
 from casadi_hands import Design
-from casadi_hands.export.markup import OBJECT_COLOR, PALM_COLOR, finger_color, joint_color
+from casadi_hands.export.markup import OBJECT_COLOR, PALM_COLOR, Color, finger_color, joint_color
 from casadi_hands.export.page.robot import Robot
 from casadi_hands.export.page.scene import EXTERNAL_COLOR, FORCE_COLOR, GOAL_COLOR, eye_towards
 from casadi_hands.export.page.timeline import Timeline, design_timeline, goal_poses
@@ -100,14 +101,25 @@ def _bodies(design: Design, timeline: Timeline, sample: int) -> list[Capsule | D
     return bodies
 
 
-def _object_at(design: Design, pose: np.ndarray, color: tuple[float, float, float], checked: bool) -> list[Capsule]:
+def _object_at(design: Design, pose: np.ndarray, color: Color, checked: bool) -> list[Capsule | Disc]:
     """The object's primitives at a pose (4, 4)."""
     checks = pose if checked else None
-    bodies = []
-    for shape in design.task.object.shapes:
-        start, end = (pose[:3, :3] @ each + pose[:3, 3] for each in shape.segment)
-        bodies.append(Capsule(start, end, shape.radius, color, checks=checks))
+    bodies: list[Capsule | Disc] = []
+    for solid in (solid for shape in design.task.object.shapes for solid in shape.body.solids()):
+        start, end = (pose[:3, :3] @ each + pose[:3, 3] for each in (solid.start, solid.end))
+        if solid.kind == "cylinder":
+            bodies.append(_disc(start, end, solid.radius, color))
+        else:
+            bodies.append(Capsule(start, end, solid.radius, color, checks=checks))
     return bodies
+
+
+def _disc(start: np.ndarray, end: np.ndarray, radius: float, color: Color) -> Disc:
+    """A cylinder between the middles (3,) of its faces."""
+    length, pose = float(np.linalg.norm(end - start)), np.eye(4)
+    turn, _ = Rotation.align_vectors([(end - start) / length], [[0, 0, 1]])
+    pose[:3] = np.column_stack([turn.as_matrix(), end])
+    return Disc(pose, radius, length, color)
 
 
 def _extent(bodies: list[Capsule | Disc]) -> np.ndarray:
@@ -124,7 +136,7 @@ def _extent(bodies: list[Capsule | Disc]) -> np.ndarray:
     return np.vstack(points)
 
 
-def _goals(design: Design) -> list[Capsule]:
+def _goals(design: Design) -> list[Capsule | Disc]:
     """The object at each goal pose; for a drawing task a dot at each goal point."""
     task = design.task
     if task.tool is None:
@@ -137,7 +149,7 @@ def _draw_goals(picture: np.ndarray, distance: np.ndarray, camera: Camera, desig
     """Draw each goal pose as a ghost of the object; for a drawing task the goals' points and the tool's path."""
     goals, tool = _goals(design), design.task.tool
     if tool is None:
-        pieces = len(design.task.object.shapes)
+        pieces = len(goals) // len(goal_poses(design.task))
         for k in range(0, len(goals), pieces):
             overlay(picture, distance, camera, goals[k : k + pieces], 0.13, False)
         return

@@ -14,6 +14,7 @@ from ruamel.yaml import YAML
 from scipy.spatial.transform import Rotation as Turn
 
 from casadi_hands.errors import HandsError, TaskError
+from casadi_hands.geometry.bodies import Body
 from casadi_hands.task import Task, parse_task
 from casadi_hands.task.object import ManipulatedObject
 from casadi_hands.task.rotation import UPRIGHT, Rotation, rotation_matrix
@@ -124,7 +125,7 @@ def varied(data: dict[str, Any], change: Change) -> dict[str, Any]:
 def move_contact(body: ManipulatedObject, point: np.ndarray, degrees: float, heading: float) -> np.ndarray:
     """Move a contact along the surface of its primitive.
 
-    It turns about the nearest point of the primitive's axis and is put back on the surface. (About the object's
+    It turns about the nearest point of the primitive's core and is put back on the surface. (About the object's
     middle, 15 degrees would take a contact on a pencil to the pencil's other side.)
 
     Args:
@@ -136,15 +137,17 @@ def move_contact(body: ManipulatedObject, point: np.ndarray, degrees: float, hea
     Returns:
         (3,) on the surface.
     """
-    shape = min(body.shapes, key=lambda each: abs(each.signed_distance(point)))
-    center = shape.nearest_on_axis(point)
-    out = (point - center) / np.linalg.norm(point - center)
+    solid = _touched(body, point)
+    out = solid.outward(point)
     across = np.linalg.svd(out[None])[2][1:]
     axis = np.cos(heading) * across[0] + np.sin(heading) * across[1]
-    moved = center + shape.radius * rotation_matrix(np.radians(degrees) * axis) @ out
-    below = shape.nearest_on_axis(moved)
-    surface: np.ndarray = below + shape.radius * (moved - below) / np.linalg.norm(moved - below)
-    return surface
+    return solid.on_surface(solid.core_point(point) + solid.ball * rotation_matrix(np.radians(degrees) * axis) @ out)
+
+
+def _touched(body: ManipulatedObject, point: np.ndarray) -> Body:
+    """The primitive whose surface is nearest to a point (3,)."""
+    solids: list[Body] = [shape.body for shape in body.shapes]
+    return min(solids, key=lambda each: abs(each.signed_distance(point)))
 
 
 def fingertips_fit(task: Task) -> bool:
@@ -154,8 +157,7 @@ def fingertips_fit(task: Task) -> bool:
     tips = []
     for finger in task.fingers.values():
         point = np.array(finger.touches)
-        shape = min(task.object.shapes, key=lambda each: abs(each.signed_distance(point)))
-        out = (point - shape.nearest_on_axis(point)) / shape.radius
+        out = _touched(task.object, point).outward(point)
         tips.append(position + rotation_matrix(vector) @ (point + radius * out))
     apart = all(np.linalg.norm(a - b) >= 2 * radius for i, a in enumerate(tips) for b in tips[:i])
     above = task.ground is None or all(tip[2] - radius >= task.ground.height for tip in tips)

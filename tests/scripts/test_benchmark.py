@@ -155,7 +155,7 @@ def test_tasks_are_of_the_size_asked_for(size: Size) -> None:
     model = build_model(task_of(size))
     assert len(model.schedule.keyframes) == size.keyframes
     assert len(model.schedule.samples) == 2 * size.keyframes - 1
-    assert len(model.primitives) == size.primitives
+    assert len(model.bodies) == size.primitives
     assert model.contacts == size.fingers
     assert len({tuple(patch) for patch in model.patches}) == size.fingers
 

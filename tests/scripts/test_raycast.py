@@ -8,8 +8,7 @@ import pytest
 from camera import OVERSAMPLING, Camera, look, png
 from raycast import Capsule, Disc, draw
 
-from casadi_hands.task import shapes
-from casadi_hands.task.fields import vector
+from casadi_hands.geometry.bodies import capsule as bodies
 
 GREY = (0.5, 0.5, 0.5)
 EYE = np.array([0.6, -0.64, 0.48])
@@ -21,7 +20,7 @@ def camera_at(points: np.ndarray) -> Camera:
 
 def test_capsule_is_met_where_its_distance_is_zero() -> None:
     start, end, radius = np.array([-0.03, 0.01, 0.02]), np.array([0.05, -0.02, 0.0]), 0.015
-    capsule = shapes.Capsule(start=vector(start), end=vector(end), radius=radius)
+    capsule = bodies.Capsule(start, end, radius)
     camera = camera_at(np.array([start, end]))
     _, distance = draw(camera, [Capsule(start, end, radius, GREY)])
     rays = camera.rays

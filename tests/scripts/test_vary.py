@@ -49,7 +49,10 @@ def lowest(task: Task, number: int) -> float:
     """Height of the object's lowest point at a goal."""
     _, position, vector = task.goal_poses()[number]
     rotation = pin.exp3(vector)
-    return min(float((position + rotation @ p)[2]) - s.radius for s in task.object.shapes for p in s.segment)
+    raised = (
+        float((position + rotation @ p)[2]) - s.body.radius for s in task.object.shapes for p in s.body.edges()[0]
+    )
+    return min(raised)
 
 
 @pytest.mark.parametrize("file", PROBLEMS, ids=name_of)
