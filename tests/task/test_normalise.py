@@ -27,8 +27,9 @@ def test_points_keep_their_place_in_the_world() -> None:
     capsule, sphere = task.object.shapes
     assert task.object.center_of_mass == (0, 0, 0)
     # The solids' first moments cancel about the new origin.
-    assert capsule.volume * capsule.centroid + sphere.volume * sphere.centroid == pytest.approx(np.zeros(3), abs=1e-18)
-    start = capsule.segment[0]
+    rod, ball = capsule.body, sphere.body
+    assert rod.volume * rod.centroid + ball.volume * ball.centroid == pytest.approx(np.zeros(3), abs=1e-18)
+    start = np.array(capsule.start)
     shank_end = [[0, 0, 0.2], [0.01, 0, 0.2]]
     for (_, position, vector), expected in zip(task.goal_poses(), shank_end, strict=True):
         assert position + ScipyRotation.from_rotvec(vector).apply(start) == pytest.approx(expected)
@@ -39,7 +40,7 @@ def test_points_keep_their_place_in_the_world() -> None:
 
 def test_contacts_are_moved_onto_the_nearest_surface() -> None:
     task = parse_task(BOLT)
-    start = task.object.shapes[0].segment[0]
+    start = np.array(task.object.shapes[0].start)
     index = np.array(task.fingers["index"].touches) - start
     direction = np.array([-0.01, 0.001]) / np.hypot(0.01, 0.001)
     assert index == pytest.approx([0.03, *(0.01 * direction)])
@@ -48,7 +49,7 @@ def test_contacts_are_moved_onto_the_nearest_surface() -> None:
 def test_given_centre_of_mass() -> None:
     task = parse_task(BOLT.replace("mass: 0.06", "mass: 0.06\n  center_of_mass: [0.02, 0, 0.001]"))
     assert task.object.center_of_mass == (0, 0, 0)
-    assert task.object.shapes[0].segment[0] == pytest.approx([-0.02, 0, -0.001])
+    assert task.object.shapes[0].start == pytest.approx([-0.02, 0, -0.001])
     # The inertia stays that of the solids about their own centre.
     assert task.object.inertia == parse_task(BOLT).object.inertia
 

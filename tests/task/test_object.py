@@ -12,11 +12,12 @@ def test_mass_properties_of_two_shapes_agree_with_pinocchio() -> None:
     rod = Capsule(start=(-0.03, 0, 0), end=(0.03, 0, 0), radius=0.008)
     body = ManipulatedObject(mass=0.2, shapes=(ball, rod))
 
-    density = 0.2 / (ball.volume + rod.volume)
-    of_ball = pin.Inertia.FromSphere(density * ball.volume, 0.02).se3Action(pin.SE3(np.eye(3), np.array(ball.center)))
+    density = 0.2 / (ball.body.volume + rod.body.volume)
+    beside = pin.SE3(np.eye(3), np.array(ball.center))
+    of_ball = pin.Inertia.FromSphere(density * ball.body.volume, 0.02).se3Action(beside)
     # Pinocchio's capsule lies along z, and its mass there is exact; turn it onto x.
     lying = pin.SE3(ScipyRotation.from_euler("y", 90, degrees=True).as_matrix(), np.zeros(3))
-    of_rod = pin.Inertia.FromCapsule(density * rod.volume, 0.008, 0.06).se3Action(lying)
+    of_rod = pin.Inertia.FromCapsule(density * rod.body.volume, 0.008, 0.06).se3Action(lying)
     whole = of_ball + of_rod
     assert body.center_of_mass == pytest.approx(whole.lever, abs=1e-12)
     assert np.array(body.inertia) == pytest.approx(whole.inertia, rel=1e-9, abs=1e-15)
@@ -48,7 +49,7 @@ def test_lowest_point_is_lowest_of_points_on_the_surface() -> None:
     rng = np.random.default_rng(1)
     directions = rng.normal(size=(4000, 3))
     directions /= np.linalg.norm(directions, axis=1)[:, None]
-    surface = np.vstack([np.array(end) + capsule.radius * directions for end in capsule.segment])
+    surface = np.vstack([np.array(end) + capsule.radius * directions for end in (capsule.start, capsule.end)])
     for rotation in ScipyRotation.random(20, rng=2):
         lowest = float(rotation.apply(body.lowest_point(rotation.as_matrix()))[2])
         sampled = float(rotation.apply(surface)[:, 2].min())

@@ -1,6 +1,7 @@
 """The task files that come with the package: they load, and a hand could hold the object at every goal."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -72,7 +73,13 @@ def test_gravity_is_all_that_differs_between_the_first_two() -> None:
 
 def lowest_height(task: Task, position: np.ndarray, vector: np.ndarray) -> float:
     turn = ScipyRotation.from_rotvec(vector)
-    return min(float((position + turn.apply(end))[2]) - s.radius for s in task.object.shapes for end in s.segment)
+    return min(float((position + turn.apply(end))[2]) - s.radius for s in task.object.shapes for end in ends_of(s))
+
+
+def ends_of(shape: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Both ends of a sphere's or a capsule's axis, (3,) each."""
+    start, end = (shape.center, shape.center) if hasattr(shape, "center") else (shape.start, shape.end)
+    return np.array(start), np.array(end)
 
 
 def holds(task: Task, vector: np.ndarray, push: np.ndarray, resting: bool) -> bool:
@@ -111,7 +118,7 @@ def inward(task: Task, point: tuple[float, float, float]) -> np.ndarray:
     def distance(at: np.ndarray) -> float:
         gaps = []
         for shape in task.object.shapes:
-            start, end = shape.segment
+            start, end = ends_of(shape)
             samples = start + np.linspace(0, 1, 2001)[:, None] * (end - start)
             gaps.append(np.linalg.norm(samples - at, axis=1).min() - shape.radius)
         return float(min(gaps))

@@ -152,10 +152,10 @@ SPOILT = {
     ),
     "unknown shape": (
         "capsule: {start",
-        "cylinder: {start",
+        "cone: {start",
         (
-            "5: object.shapes[0]: given a mapping of cylinder; allowed: sphere: {center, radius} or capsule: "
-            "{start, end, radius}"
+            "5: object.shapes[0]: given a mapping of cone; allowed: sphere: {center, radius} or capsule: "
+            "{start, end, radius}..."
         ),
     ),
     "shape without a kind": (
@@ -163,7 +163,7 @@ SPOILT = {
         "{radius: 0.02, center: [0, 0, 0]}",
         (
             "5: object.shapes[0]: given a mapping of radius, center; allowed: sphere: {center, radius} or "
-            "capsule: {start, end, radius}"
+            "capsule: {start, end, radius}..."
         ),
     ),
     "no shapes": (
@@ -179,7 +179,7 @@ SPOILT = {
     "field of a shape": (
         "radius: 0.02",
         "radius: 0.02, length: 1",
-        "5: object.shapes[0].capsule.length: given an unknown field; allowed: radius, start, end",
+        "5: object.shapes[0].capsule.length: given an unknown field; allowed: start, end, radius",
     ),
     "centre of mass outside": (
         "mass: 0.1",
