@@ -64,6 +64,7 @@ FRICTION_CONE_HAND = replace(
     FRICTION_CONE,
     name="friction_cone_hand",
     about="Friction against the fingertip's normal",
+    equation="eq. 2.30",
     weights={"whole_hand": Weight(0.1)},
 )
 # The refinement's.
