@@ -12,7 +12,6 @@ from itertools import compress
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.geometry.contact_points import inward_normals
@@ -23,7 +22,7 @@ from casadi_hands.problem.result import Result
 from casadi_hands.stages.floating.gate import needed_wrenches
 from casadi_hands.statics.grasp import grasp_map, spread_forces
 from casadi_hands.statics.joints import structural_projector
-from casadi_hands.statics.programmes import least_largest, least_largest_solution
+from casadi_hands.statics.programmes import least_largest, least_largest_solution, nonnegative_fit
 from casadi_hands.terms.finger import NULL_SPACE_DAMPING
 
 Array = NDArray[np.float64]
@@ -71,7 +70,7 @@ def holdings(model: Model, floating: Floating, friction: float | None = None) ->
         normals = inward_normals(points[active], list(compress(model.touched, active)))
         forces = spread_forces(normals, mu[active])
         wrenches = grasp_map(points[active]) @ forces
-        made = wrenches @ nnls(wrenches, needed)[0]
+        made = wrenches @ nonnegative_fit(wrenches, needed)[0]
         # Normal forces: every edge has one of unit length.
         count = int(active.sum())
         normal = np.asarray(np.kron(np.eye(count), np.ones(forces.shape[1] // count)), float)
@@ -158,7 +157,7 @@ def _load(model: Model, design: Result, k: int) -> Load | None:
     wrenches = grasp_map(points) @ forces
     planned = (motion.contact_force[k, contacts] @ turn / model.units.force).reshape(-1)
     needed = grasp_map(points) @ planned
-    made = wrenches @ nnls(wrenches, needed)[0]
+    made = wrenches @ nonnegative_fit(wrenches, needed)[0]
     if np.linalg.norm(needed - made) > HELD:
         return None
     torques, structural, joints = [], [], []

@@ -15,6 +15,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from casadi_hands.nlp.failure import SolverError
 from casadi_hands.nlp.kernel import Term
 from casadi_hands.nlp.problem import Problem
 from casadi_hands.nlp.program import Program
@@ -176,6 +177,7 @@ class Solver:
         Raises:
             KeyError: a name that is not in the problem, or a parameter left out.
             KeyboardInterrupt: the solve was interrupted.
+            SolverError: IPOPT broke off with an error, which no status of a solution tells.
         """
         program = self.program(start, parameters, lower, upper, constraints)
         options = options or Options()
@@ -184,7 +186,10 @@ class Solver:
         if watch:
             watch.interrupted = False
         started = time.perf_counter()
-        answer = solver(**program.numbers)
+        try:
+            answer = solver(**program.numbers)
+        except RuntimeError as error:
+            raise SolverError(f"IPOPT: {error}") from error
         seconds = time.perf_counter() - started
         stats = solver.stats()
         if stats["return_status"] == "NonIpopt_Exception_Thrown" or (watch and watch.interrupted):

@@ -1,12 +1,22 @@
-"""Linear programmes over forces in friction cones."""
+"""Linear programmes and least squares over forces in friction cones."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
+from scipy.optimize import linprog, lsq_linear, nnls
 
 Array = NDArray[np.float64]
+
+
+def nonnegative_fit(matrix: Array, wanted: Array) -> tuple[Array, float]:
+    """The x >= 0 with which ``matrix @ x`` is nearest to what is wanted, and how far it is from that."""
+    try:
+        x, missing = nnls(matrix, wanted)
+    except RuntimeError:  # after too many changes of its active set; an interior point is as near, to its tolerance
+        x = lsq_linear(matrix, wanted, (0.0, np.inf)).x
+        missing = np.linalg.norm(matrix @ x - wanted)
+    return np.asarray(x), float(missing)
 
 
 def least_largest(rows: Array, wrenches: Array, wrench: Array) -> float:

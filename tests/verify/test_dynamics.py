@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from casadi_hands.verify.figures import dynamics
 from casadi_hands.verify.figures.dynamics import between_residual, sample_residual, shoot
 from casadi_hands.verify.reading.folder import Folder, read_folder
 from tests.verify.fixture import SPHERE, plain, read_task
@@ -123,3 +126,21 @@ def test_forces_that_whirl_the_object_round_leave_a_large_residual(squeeze: floa
         force, torque = sample_residual(folder, shots)
     assert np.isfinite(force).all()
     assert torque.min() > 5
+
+
+def test_a_shot_that_answers_to_no_launch_is_lost(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = _read(tmp_path, SPHERE)
+    found = dynamics._miss
+
+    def deaf(*arguments: Any) -> tuple[np.ndarray, np.ndarray]:
+        miss, jacobian = found(*arguments)
+        jacobian[3] = 0
+        return miss, jacobian
+
+    expected = shoot(folder)
+    monkeypatch.setattr(dynamics, "_miss", deaf)
+    shots = shoot(folder)
+    for field in fields(shots):
+        one, other = getattr(shots, field.name), getattr(expected, field.name)
+        np.testing.assert_array_equal(np.delete(one, 3, axis=0), np.delete(other, 3, axis=0))
+        assert np.isfinite(one[3]).all()

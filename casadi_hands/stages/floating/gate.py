@@ -8,12 +8,12 @@ from itertools import compress
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from casadi_hands.geometry.contact_points import inward_normals
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.palm_motion import poses_at
 from casadi_hands.statics.grasp import EDGES, friction_edges, grasp_map
+from casadi_hands.statics.programmes import nonnegative_fit
 
 Array = NDArray[np.float64]
 _PRELOAD = 1.0  # m·g, normal force of the first guess
@@ -58,7 +58,10 @@ def passes_gate(model: Model, values: Mapping[str, Array], pivots: bool = False)
 
     The needed wrench is the motion's own: inertial forces less gravity, in the object's frame. With ``pivots`` the
     rank of two contacts is enough: the object may hang between them, free about their line, while a finger lifts.
+    A motion that broke down, with values that are no numbers, does not pass.
     """
+    if not all(np.isfinite(values[name]).all() for name in ("pose", "point", "invariant")):
+        return False
     wrenches_needed = needed_wrenches(model, values["pose"])
     bodies, friction = model.touched, model.frictions
     contacts = len(bodies)
@@ -77,6 +80,6 @@ def passes_gate(model: Model, values: Mapping[str, Array], pivots: bool = False)
         for i, point in enumerate(points[active]):
             span = slice(i * EDGES, (i + 1) * EDGES)
             wrenches[3:, span] = np.cross(point[None, :], edges[:, span].T).T
-        if nnls(wrenches, needed)[1] > _GATE:
+        if nonnegative_fit(wrenches, needed)[1] > _GATE:
             return False
     return True

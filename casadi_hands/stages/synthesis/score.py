@@ -13,7 +13,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from casadi_hands.kinematics.numeric import contact_kinematics
 from casadi_hands.kinematics.singularity import passes_singularity
@@ -21,6 +20,7 @@ from casadi_hands.stages.synthesis.stage import Synthesised
 from casadi_hands.stages.synthesis.target import Target
 from casadi_hands.statics.grasp import friction_edges, grasp_map
 from casadi_hands.statics.joints import structural_projector
+from casadi_hands.statics.programmes import nonnegative_fit
 from casadi_hands.terms.finger import NULL_SPACE_DAMPING
 
 Array = NDArray[np.float64]
@@ -87,6 +87,6 @@ def _structural_forces(target: Target, contacts: Sequence[int], k: int, jacobian
     planned = target.forces[k, chosen].reshape(-1)
     matrix = np.vstack([np.sqrt(_BALANCE) * grasp @ spread, projectors @ spread, np.sqrt(_STAY) * spread])
     wanted = np.concatenate([np.sqrt(_BALANCE) * grasp @ planned, np.zeros(len(planned)), np.sqrt(_STAY) * planned])
-    forces = spread @ nnls(matrix, wanted)[0]
+    forces = spread @ nonnegative_fit(matrix, wanted)[0]
     structural[active] = np.linalg.norm((projectors @ forces).reshape(-1, 3), axis=1)
     return structural

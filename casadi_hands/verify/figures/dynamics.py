@@ -107,7 +107,10 @@ def shoot(folder: Folder) -> Shots:
     lost = np.zeros(len(rate), bool)
     for _ in range(20):
         miss, jacobian = _miss(folder, loads, start, end, rate)
-        step = np.linalg.solve(jacobian, miss[..., None])[..., 0]
+        # A shot that is whirled as fast as can be arrives alike, however it is launched.
+        deaf = np.linalg.det(jacobian) == 0
+        step = np.linalg.solve(np.where(deaf[:, None, None], np.eye(3), jacobian), miss[..., None])[..., 0]
+        lost |= deaf
         lost |= np.linalg.norm(step * time, axis=1) > FARTHEST_SHOT
         rate = np.where(lost[:, None], mean, rate - step)
         if np.max(np.abs(step * time)[~lost], initial=0.0) < 1e-14:

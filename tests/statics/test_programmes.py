@@ -1,0 +1,34 @@
+"""Least squares over forces that may only push."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from casadi_hands.statics import programmes
+
+
+@pytest.mark.parametrize("gives_up", [False, True])
+def test_a_nonnegative_fit_is_as_near_as_can_be(gives_up: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    def circles(*_: Any) -> Any:
+        raise RuntimeError("Maximum number of iterations reached.")
+
+    if gives_up:
+        monkeypatch.setattr(programmes, "nnls", circles)
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        matrix, wanted = rng.normal(size=(6, 4)), rng.normal(size=6)
+        x, missing = programmes.nonnegative_fit(matrix, wanted)
+        found = minimize(
+            lambda x, a=matrix, b=wanted: ((a @ x - b) ** 2).sum(),
+            np.ones(4),
+            jac=lambda x, a=matrix, b=wanted: 2 * a.T @ (a @ x - b),
+            bounds=[(0, None)] * 4,
+            tol=1e-14,
+        )
+        assert (x >= 0).all()
+        assert missing == pytest.approx(np.linalg.norm(matrix @ x - wanted), rel=1e-9)
+        assert missing == pytest.approx(np.sqrt(found.fun), rel=1e-6)
