@@ -1,39 +1,45 @@
-"""A capsule's smooth surface against its geometry in NumPy, and directions across it."""
+"""Ways over surfaces against arcs, and directions across them."""
 
 from __future__ import annotations
 
 import casadi as ca
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from casadi_hands.geometry.surface import smooth_surface, tangents
-from tests.stages.blocks import surface
-
-
-def test_a_smooth_surface_is_the_capsule_but_at_its_kinks() -> None:
-    capsule = np.array([0.1, 0.2, -0.4, 0.3, 0, 0.8, 0.25])
-    point, start, end, radius = (ca.SX.sym(n, k) for n, k in (("p", 3), ("s", 3), ("e", 3), ("r", 1)))
-    function = ca.Function("f", [point, start, end, radius], [*smooth_surface(point, start, end, radius)])
-    for at in np.random.default_rng(0).normal(size=(200, 3)):
-        distance, normal = function(at, capsule[:3], capsule[3:6], capsule[6])
-        expected, outward = surface(at, capsule)
-        assert float(distance) == pytest.approx(expected, abs=1e-5)
-        np.testing.assert_allclose(np.asarray(normal).ravel(), outward, atol=3e-3)
+from casadi_hands.geometry.surface import path_between, tangents
 
 
-def test_a_surface_s_derivatives_are_finite_on_its_kinks_and_its_axis() -> None:
-    point = ca.SX.sym("point", 3)
-    start, end, radius = ca.SX([0, 0, 0]), ca.SX([0, 0, 0.8]), ca.SX(0.25)
-    distance, normal = smooth_surface(point, start, end, radius)
-    hessian, gradient = ca.hessian(distance, point)
-    function = ca.Function("f", [point], [gradient, hessian, normal])
-    for at in ([0.25, 0, 0], [0.2, 0.1, 0.8], [0, 0, 0.4], [0, 0, 0], [0, 0, 1.05]):
-        gradient, hessian, normal = (np.asarray(value) for value in function(at))
-        assert np.isfinite(hessian).all()
-        if np.linalg.norm(at[:2]) > 0:
-            # The gradient of a distance is the normal, and has a length of one.
-            np.testing.assert_allclose(gradient, normal, atol=3e-3)
-            assert np.linalg.norm(gradient) == pytest.approx(1, abs=3e-3)
+def path(points: np.ndarray, normals: np.ndarray, turns: Rotation) -> np.ndarray:
+    """The way from one knot to the next of two points (2, 3) with normals (2, 3)."""
+    found = path_between(*([ca.DM(each) for each in pair] for pair in (points, normals, turns.as_matrix())))
+    return np.asarray(found).ravel()
+
+
+def test_a_way_over_a_ball_is_its_arc() -> None:
+    # A chord of a circle is stretched to the arc, whichever way it goes.
+    rng, radius = np.random.default_rng(0), 0.4
+    for angle in (0.05, 0.3, 0.8):
+        start, across = np.linalg.qr(rng.normal(size=(3, 2)))[0].T
+        end = np.cos(angle) * start + np.sin(angle) * across
+        normals = np.array([start, end])
+        found = path(radius * normals, normals, Rotation.identity(2))
+        assert np.linalg.norm(found) == pytest.approx(radius * angle, rel=1e-2 * angle**5)
+        np.testing.assert_allclose(np.cross(found, end - start), 0, atol=1e-12)
+
+
+def test_a_way_over_what_is_flat_is_the_chord() -> None:
+    points, normals = np.array([[0, 0, 0], [0.3, -0.2, 0]]), np.tile([0, 0, 1.0], (2, 1))
+    np.testing.assert_allclose(path(points, normals, Rotation.identity(2)), points[1])
+
+
+def test_a_way_is_seen_turned_halfway() -> None:
+    points, normals = np.array([[0, 0, 0], [0.3, -0.2, 0]]), np.tile([0, 0, 1.0], (2, 1))
+    for angle in (0.1, 0.4):
+        axis = np.array([1.0, 2, 2]) / 3
+        turns = Rotation.from_rotvec(np.outer([0.3, 0.3 + angle], axis))
+        halfway = Rotation.from_rotvec((0.3 + angle / 2) * axis)
+        np.testing.assert_allclose(path(points, normals, turns), halfway.apply(points[1]), atol=0.01 * angle**4)
 
 
 def test_tangents_are_a_right_handed_frame_with_the_normal() -> None:
