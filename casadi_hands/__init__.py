@@ -11,12 +11,15 @@ if TYPE_CHECKING:
     from casadi_hands.pipeline.alternatives import explore
     from casadi_hands.pipeline.formulate import formulate
     from casadi_hands.task import load_task
+    from casadi_hands.terms.own import Bound, Cost
     from casadi_hands.verify import audit, replay
 
 __version__ = "0.1.0"
-__all__ = ["Design", "audit", "explore", "formulate", "load_task", "replay", "solve"]
+__all__ = ["Bound", "Cost", "Design", "audit", "explore", "formulate", "load_task", "replay", "solve"]
 
 _HOME = {
+    "Bound": "casadi_hands.terms.own",
+    "Cost": "casadi_hands.terms.own",
     "Design": "casadi_hands.export.design",
     "audit": "casadi_hands.verify",
     "explore": "casadi_hands.pipeline.alternatives",

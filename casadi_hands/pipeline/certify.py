@@ -60,7 +60,7 @@ class Certifier:
         short = tuple(shortcoming_reason(self.model, each) for each in found.short)
         if found.farthest > OUT_OF_REACH:
             run_whole_hand(self.record, self.model, self.floating, found.candidates[0])
-            return self.record.update_best(self.judge.judge(self.record.design, short))
+            return self.record.update_best(self.record.held_to_bounds(self.judge.judge(self.record.design, short)))
         while True:
             failing: set[str] = set()
             fewest = np.inf  # drops of a hand whose files hold

@@ -4,31 +4,31 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from casadi_hands.diagnosis.shortcoming import shortcoming_reason
 from casadi_hands.errors import SolveError
 from casadi_hands.execution.processes import processes, start_up
 from casadi_hands.export.design import Design
+from casadi_hands.nlp import SolverError
 from casadi_hands.pipeline.certify import Certifier
 from casadi_hands.pipeline.judge import Judge
 from casadi_hands.pipeline.record import STAGES, Progress, Record
 from casadi_hands.pipeline.refiner import Refiner
 from casadi_hands.pipeline.steps import adopt, prepare_search, run_floating, run_search, run_whole_hand
 from casadi_hands.pipeline.warm_start import as_floating, kept_margin, warm_start
+from casadi_hands.problem.model import Model
 from casadi_hands.problem.si import build_model
+from casadi_hands.stages.own_terms import try_out
 from casadi_hands.task import Task
+from casadi_hands.terms.own import OwnTerm, checked
 from casadi_hands.verify.replays.simulation import load_mujoco
 
 _LOG = logging.getLogger(__name__)
-# What numbers may do from one start and not from another; CasADi raises RuntimeError.
-_BROKEN_OFF = (ArithmeticError, RuntimeError, np.linalg.LinAlgError)
 
 
 def solve(
@@ -41,6 +41,7 @@ def solve(
     start: Path | None = None,
     executor: Executor | None = None,
     progress: Callable[[Progress], None] | None = None,
+    terms: Sequence[OwnTerm] = (),
 ) -> Design:
     """Design a hand for a task.
 
@@ -55,14 +56,16 @@ def solve(
         executor: where trials run, in place of processes on this machine; the design does not depend on it. One thread
             of a process runs a trial at a time, so threads gain nothing. ``jobs`` is then for the replays only.
         progress: told what is being done.
+        terms: costs and constraints of your own, ``casadi_hands.Cost`` and ``casadi_hands.Bound``. What their residuals
+            raise is raised.
 
     Returns:
-        The design; its status is earned by the audit of what is written. Where numbers break down on the way, it is
+        The design; its status is earned by the audit of what is written. Where a solver breaks off on the way, it is
         the best one so far, or what there is of it as failed.
 
     Raises:
         SolveError: ``until`` is not a stage, or not the last where there is a start; or the start is of a task of
-            another structure.
+            another structure; or one of ``terms`` cannot be used.
         DesignError: there is no result in ``start``.
         HandsError: MuJoCo, which designs are replayed in, cannot be loaded.
     """
@@ -72,15 +75,17 @@ def solve(
         raise SolveError(f"from an earlier result only the stage {STAGES[-1]} is run; it cannot stop after {until}")
     if seed is not None:
         task = task.model_copy(update={"search": task.search.model_copy(update={"seed": seed})})
+    own_terms = checked(terms)
+    try_out(replace(build_model(task), own_terms=own_terms), task.search.max_joints)
     if until in STAGES[2:]:
         load_mujoco()  # before hours of work, not after them
     jobs = jobs or os.cpu_count() or 1
-    record = Record(task, out, progress or (lambda _: None))
+    record = Record(task, out, progress or (lambda _: None), own_terms)
     with processes(jobs) if executor is None else nullcontext(executor) as workers:
         try:
             design = None if start is None else _refine_again(record, start)
             design = design or _run(record, until, workers, jobs)
-        except _BROKEN_OFF as error:
+        except SolverError as error:
             _LOG.debug("the solve broke off", exc_info=True)
             design = record.broken_off(error)
         return record.keep(design)
@@ -88,7 +93,7 @@ def solve(
 
 def _refine_again(record: Record, start: Path) -> Design | None:
     """The hand and the motion of an earlier result, refined for the task as it is now; None if another is needed."""
-    earlier, model = Design.load(start), build_model(record.task)
+    earlier, model = Design.load(start), _model(record)
     whole, margin = warm_start(earlier, record.task, model), kept_margin(earlier)
     adopt(record, model, whole)
     judge = Judge(model, as_floating(model, whole))
@@ -103,26 +108,35 @@ def _refine_again(record: Record, start: Path) -> Design | None:
     return None
 
 
+def _model(record: Record) -> Model:
+    """The task in the stages' numbers, with the person's own terms."""
+    return replace(build_model(record.task), own_terms=record.own_terms)
+
+
 def _run(record: Record, until: str, executor: Executor | None, jobs: int) -> Design:
     """All stages, to the last one asked for."""
     if executor is not None and until != "floating":
         start_up(executor, jobs)
-    model = build_model(record.task)
+    model = _model(record)
     floating = run_floating(record, model)
     model = floating.model
     if until == "floating":
-        return _stopped(record.design, until)
+        return _stopped(record, until)
     search = prepare_search(record, model, floating, executor)
     found = run_search(record, model, search)
     if until == "synthesis":
-        return _stopped(record.design, until)
+        return _stopped(record, until)
     judge = Judge(model, floating)
     if until == "whole_hand":
         run_whole_hand(record, model, floating, found.candidates[0])
-        judged = judge.judge(record.design, [shortcoming_reason(model, short) for short in found.short])
+        design = judge.judge(record.design, [shortcoming_reason(model, short) for short in found.short])
+        judged = record.held_to_bounds(design)
         return judge.replayed(judged, jobs) if judged.status == "certified" else judged
     return judge.concluded(Certifier(record, model, floating, search, judge, jobs).run(found), jobs)
 
 
-def _stopped(design: Design, stage: str) -> Design:
-    return replace(design, status="feasible", reason=f"stopped after the stage {stage}, as asked")
+def _stopped(record: Record, stage: str) -> Design:
+    """What there is after a stage; failed where that misses bounds of a person's own."""
+    stopped = replace(record.design, status="feasible", reason=f"stopped after the stage {stage}, as asked")
+    held = record.held_to_bounds(stopped)
+    return held if held is stopped else replace(held, status="failed")

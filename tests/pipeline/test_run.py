@@ -11,12 +11,14 @@ import pytest
 
 from casadi_hands.errors import DesignError, SolveError
 from casadi_hands.export.design import Design
+from casadi_hands.nlp import Options, Solver, SolverError
 from casadi_hands.pipeline import Progress, run, solve
 from casadi_hands.pipeline.record import Record
 from casadi_hands.pipeline.refiner import LARGE, Refiner
 from casadi_hands.task import parse_task
 from tests.pipeline.replayed import replayed
 from tests.pipeline.test_warm_start import HELD, earlier, edited, pressing
+from tests.stages.synthesis.example import ball_task
 
 
 @pytest.fixture
@@ -112,18 +114,70 @@ def test_what_cannot_be_started_from_is_refused_before_anything_is_written(folde
     assert Design.load(folder).status == "certified"
 
 
-def test_where_numbers_break_down_the_best_design_so_far_is_the_result(
+def test_where_a_solver_breaks_off_the_best_design_so_far_is_the_result(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def breaks(*_: Any) -> Design:
-        raise RuntimeError("SVD did not converge")
+        raise SolverError("IPOPT: no memory left")
 
     monkeypatch.setattr(run, "_run", breaks)
     design = solve(parse_task(HELD), jobs=1, out=tmp_path / "out")
     assert design.status == "failed"
-    assert "the solve broke off: SVD did not converge" in design.reason
+    assert design.reason == "the solve broke off: IPOPT: no memory left; another seed may not"
     assert Design.load(tmp_path / "out").reason == design.reason
     refined_as(monkeypatch, "certified", 1)
     design = solve(parse_task(HELD), jobs=1, start=folder, out=tmp_path / "out")
     assert design.status == "certified"
     assert Design.load(tmp_path / "out").status == "certified"
+
+
+ERRORS = [RuntimeError("shapes do not match"), ZeroDivisionError(), np.linalg.LinAlgError("singular"), TypeError("no")]
+
+
+@pytest.mark.parametrize("error", ERRORS, ids=lambda error: type(error).__name__)
+def test_a_mistake_in_the_code_is_raised_and_what_was_computed_stays(
+    error: Exception, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def mistaken(*_: Any) -> Any:
+        raise error
+
+    monkeypatch.setattr(run, "run_search", mistaken)
+    with pytest.raises(type(error)) as raised:
+        solve(ball_task(), jobs=1, out=tmp_path / "out")
+    assert raised.value is error
+    assert raised.traceback[-1].name == "mistaken"
+    left = Design.load(tmp_path / "out")
+    assert left.reason == "stopped before a hand was designed"
+    assert left.motion is not None
+
+
+def test_a_mistake_after_a_judged_design_leaves_that_in_the_folder(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refined_as(monkeypatch, "feasible", 0)
+
+    def mistaken(*_: Any) -> Any:
+        raise RuntimeError("a mistake")
+
+    monkeypatch.setattr(run, "_run", mistaken)
+    with pytest.raises(RuntimeError, match="a mistake"):
+        solve(parse_task(HELD), jobs=1, start=folder, out=tmp_path / "out")
+    assert Design.load(tmp_path / "out").hand is not None
+
+
+def test_only_what_ipopt_itself_raises_is_a_solvers_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: Any, **__: Any) -> Any:
+        raise RuntimeError("linear solver not found")
+
+    class Broken(Solver):
+        def nlpsol(self, options: Options) -> Any:
+            return broken
+
+    monkeypatch.setattr("casadi_hands.stages.floating.stage.Solver", Broken)
+    design = solve(ball_task(), jobs=1, until="floating")
+    assert design.status == "failed"
+    assert design.reason == "the solve broke off: IPOPT: linear solver not found; another seed may not"
+    monkeypatch.setattr(Broken, "nlpsol", broken)
+    with pytest.raises(RuntimeError, match="linear solver not found") as raised:
+        solve(ball_task(), jobs=1, until="floating")
+    assert type(raised.value) is RuntimeError

@@ -16,6 +16,7 @@ from casadi_hands.pipeline import STAGES, Progress, solve
 from casadi_hands.pipeline.alternatives.folder import remove_alternatives, remove_surplus, seed_folder, write_ranking
 from casadi_hands.pipeline.alternatives.ranking import Alternative, rank
 from casadi_hands.task import Task
+from casadi_hands.terms.own import OwnTerm
 
 
 def explore(
@@ -27,6 +28,7 @@ def explore(
     out: Path | str | None = None,
     executor: Executor | None = None,
     progress: Callable[[Progress], None] | None = None,
+    terms: Sequence[OwnTerm] = (),
 ) -> list[Alternative]:
     """Design hands for a task from several seeds, one after the other, and rank them.
 
@@ -44,6 +46,7 @@ def explore(
             again.
         executor: where trials run, in place of processes on this machine, as for ``solve``.
         progress: told what is being done; its times count from the start of the first seed.
+        terms: costs and constraints of your own, as for ``solve``.
 
     Returns:
         What each seed gave, best first; a seed that failed has its reason in the design.
@@ -69,7 +72,9 @@ def explore(
         folder = None if out is None else seed_folder(out, seed)
         told = _within(report, seed, time.perf_counter() - began)
         try:
-            designs[seed] = solve(task, seed=seed, jobs=jobs, until=until, out=folder, executor=executor, progress=told)
+            designs[seed] = solve(
+                task, seed=seed, jobs=jobs, until=until, out=folder, executor=executor, progress=told, terms=terms
+            )
         except SolveError as error:
             errors.append(error)
             if len(errors) == len(seeds):

@@ -114,7 +114,7 @@ def term_weights(problem: Problem, model: Model, weights: Mapping[str, float]) -
     """
     keyframes, samples, _ = sizes(model)
     goals = samples if model.tool is not None else len(model.goal_positions)
-    values, own = dict(own_values(problem, model)), {term.name for term in model.own_terms}
+    values, own = own_values(problem, model), {term.name for term in model.own_terms}
     for name, term in problem.declared_terms.items():
         per_goal = any(weight.per == "goal" for weight in term.weights.values())
         count = samples if name in own else goals if per_goal else keyframes

@@ -72,7 +72,7 @@ class WholeHandStage:
             step = problem.parameter("keyframe_step", (1, 1))
             problem.bind(kernels.palm_motion(), palm=three, keyframe_step=step)
         rows = {"pose": side.pose[1], "point": side.point[1], "force": side.force, "invariant": side.invariant}
-        sampled = {c: each.combine(schedule.spline(), 0) for c, each in angles.items()}
+        sampled = {c: each.combine(schedule.spline()) for c, each in angles.items()}
         bind_own(problem, model, "whole_hand", contact_names(model), sampled, **rows)
         self.solver = Solver(problem)
 
