@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from casadi_hands.nlp.program_index import Quantity
 
 _DISTURBED = "_perturbed"
-_POSE, _TORQUE, _CAPSULE = "length, rad", "m·g·length", "length"
+_POSE, _TORQUE = "length, rad", "m·g·length"
 _QUANTITIES = {
     # Variables.
     "pose": Quantity("object's pose in the world, one row a keyframe or knot", _POSE),
@@ -22,7 +22,7 @@ _QUANTITIES = {
     "force_disturbed": Quantity("contact forces on the object under the disturbances; object frame", "m·g"),
     "wrench": Quantity("the contacts' force and torque on the object; object frame", f"m·g, {_TORQUE}"),
     "middle_torque": Quantity("the contacts' torque halfway between two knots; object frame", _TORQUE),
-    "activity": Quantity("contact invariants: 1 where a contact acts, 0 where it does not", ""),
+    "invariant": Quantity("contact invariants: 1 where a contact acts, 0 where it does not", ""),
     "palm": Quantity("palm's offset from its given motion: translation and rotation vector, world", _POSE),
     "base": Quantity("where the finger stands on the palm", "length"),
     "lengths": Quantity("of the links", "length"),
@@ -39,11 +39,12 @@ _QUANTITIES = {
     "external_force": Quantity("disturbing force, world", "m·g"),
     "external_torque": Quantity("disturbing torque, world", _TORQUE),
     "carried_acceleration": Quantity("of an object that goes as the palm does, world", "length/s²"),
-    "primitives": Quantity("object's capsules: start, end, radius", _CAPSULE),
-    "all_primitives": Quantity("object's capsules: start, end, radius", _CAPSULE),
-    "capsules": Quantity("the capsule that each contact is on: start, end, radius; object frame", _CAPSULE),
-    "capsule": Quantity("the capsule that the contact is on: start, end, radius; object frame", _CAPSULE),
-    "ground_capsule": Quantity("the capsule that stands on the ground; object frame", _CAPSULE),
+    "bodies": Quantity(
+        "parameters of all bodies that the object is made of; object frame, of synthesis palm frame", "length"
+    ),
+    "object": Quantity("parameters of the object's body of this number; object frame", "length"),
+    "body": Quantity("parameters of the body that the contact is on; object frame", "length"),
+    "ground_body": Quantity("parameters of the body that stands on the ground; object frame", "length"),
     # Contacts.
     "friction": Quantity("coefficient of friction, or the part of it that may be used", ""),
     "ground_friction": Quantity("the ground's, likewise", ""),
@@ -51,7 +52,7 @@ _QUANTITIES = {
     "patches": Quantity("where contacts are wanted; object frame", "length"),
     "tie": Quantity("how strongly the contact is held to where it is wanted", ""),
     "helper": Quantity("directions across the surface, from which tangents are made; object frame", ""),
-    "branch": Quantity("signs of the regularity to be kept: which way the finger bends", ""),
+    "margin_direction": Quantity("signs of the singularity margin to be kept: which way the finger bends", ""),
     # Goals.
     "targets": Quantity("goals' positions, world", "length"),
     "vectors": Quantity("goals' rotation vectors, world", "rad"),
@@ -89,6 +90,11 @@ _QUANTITIES = {
     "active": Quantity("1 where the contact acts, 0 where it does not", ""),
     "idle_step": Quantity("half the time between the keyframes around one in the air", "s"),
     "keyframe_step": Quantity("mean time between keyframes", "s"),
+    # What a user's own terms read.
+    "time": Quantity("of the samples", "s"),
+    "unit_length": Quantity("the characteristic length", "m"),
+    "unit_force": Quantity("the object's weight", "N"),
+    # What costs hold a finger near to.
     "wanted_base": Quantity("where costs hold the finger's base near to", "length"),
     "wanted_lengths": Quantity("the links' lengths that costs hold near to", "length"),
     "wanted_axes": Quantity("the joints' axes that costs hold near to", "rad"),
@@ -112,10 +118,11 @@ def _quantity(name: str, contacts: Sequence[str]) -> Quantity | None:
     if name.startswith("near."):
         of = _quantity(name.removeprefix("near."), contacts)
         return of and Quantity(f"where the proximal term is least: {of.about}", of.unit)
-    kind = name.rstrip("0123456789")
-    found = _QUANTITIES.get(kind) or _QUANTITIES.get(kind.removesuffix(_DISTURBED))
-    if found is None or kind == name:
+    plain = name if name in _QUANTITIES else name.removesuffix(_DISTURBED)
+    kind = plain.rstrip("0123456789")
+    found = _QUANTITIES.get(kind)
+    if found is None or kind == plain or kind == "object":
         return found
-    index = int(name.removeprefix(kind))
+    index = int(plain.removeprefix(kind))
     owner = f"finger '{contacts[index]}'" if index < len(contacts) else "the ground"
     return Quantity(f"{owner}: {found.about}", found.unit)
