@@ -16,6 +16,7 @@ from casadi import Function
 
 from casadi_hands.errors import SolveError
 from casadi_hands.execution.processes import processes, start_up
+from casadi_hands.nlp.failure import SolverError
 from casadi_hands.nlp.program import Program
 from casadi_hands.nlp.program_folder import save_program
 from casadi_hands.nlp.solver import Solve, keep_solves
@@ -136,7 +137,7 @@ def formulate(
         progress: told what is being done.
 
     Raises:
-        SolveError: there is no such stage, or numbers broke down before its solve.
+        SolveError: there is no such stage, or a solver broke off before its solve.
     """
     if stage not in STAGES:
         raise SolveError(f"stage: given {stage!r}; allowed: {', '.join(STAGES)}")
@@ -149,9 +150,9 @@ def formulate(
             start_up(workers, jobs)
         try:
             model, step, solve = _posed(record, stage, workers)
-        except (ArithmeticError, RuntimeError, np.linalg.LinAlgError) as error:
+        except SolverError as error:
             _LOG.debug("the stages broke off", exc_info=True)
-            raise SolveError(f"numbers broke down before the stage {stage} posed its program: {error}") from error
+            raise SolveError(f"a solver broke off before the stage {stage} posed its program: {error}") from error
     return Formulation(task.name, stage, task.search.seed, step, model, solve)
 
 

@@ -15,6 +15,7 @@ import pytest
 
 import casadi_hands
 from casadi_hands.errors import SolveError
+from casadi_hands.nlp import SolverError
 from casadi_hands.nlp.solver import Solver
 from casadi_hands.pipeline import STAGES
 from casadi_hands.pipeline.formulate import Formulation, formulate
@@ -191,13 +192,16 @@ def test_a_stage_that_is_none_is_refused() -> None:
         formulate(ball_task(), "refined")
 
 
-def test_numbers_that_break_down_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(*_: object) -> None:
-        raise RuntimeError("not finite")
+def test_a_solver_that_breaks_off_is_told_and_a_mistake_is_raised(monkeypatch: pytest.MonkeyPatch) -> None:
+    for error, seen in ((SolverError("no memory"), SolveError), (RuntimeError("no memory"), RuntimeError)):
 
-    monkeypatch.setattr(Solver, "solve", broken)
-    with pytest.raises(SolveError, match="before the stage floating posed its program: not finite"):
-        formulate(ball_task(), "floating")
+        def broken(*_: object, error: Exception = error) -> None:
+            raise error
+
+        monkeypatch.setattr(Solver, "solve", broken)
+        with pytest.raises(seen, match="no memory") as raised:
+            formulate(ball_task(), "floating")
+        assert type(raised.value) is seen
 
 
 def test_a_folder_that_cannot_be_written_is_told(formulations: dict[str, Formulation], tmp_path: Path) -> None:
