@@ -19,6 +19,8 @@ import numpy as np
 import pytest
 from casadi import SX, Function
 
+from casadi_hands.geometry.bodies.capsule import Capsule
+from casadi_hands.geometry.bodies.sphere import Sphere
 from casadi_hands.nlp import Kernel, derivatives, machine_code
 from casadi_hands.nlp.derivatives import kernel_functions
 from casadi_hands.nlp.machine_code import cache_folder, compiler
@@ -108,8 +110,8 @@ def suffixes(cache: Path) -> list[str]:
 def kernels() -> list[Kernel]:
     return [
         dynamics(2),
-        finger_kernels.contact(2, True),
-        finger_kernels.rolling(1),
+        finger_kernels.contact(2, Capsule, True),
+        finger_kernels.rolling(1, Sphere),
         finger_kernels.fingers_apart(1, 2),
     ]
 

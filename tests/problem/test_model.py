@@ -13,6 +13,8 @@ from ruamel.yaml import YAML
 from scipy.integrate import quad
 from scipy.spatial.transform import Rotation, Slerp
 
+from casadi_hands.geometry.bodies.capsule import Capsule
+from casadi_hands.geometry.bodies.sphere import Sphere
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.si import build_model
 from casadi_hands.stages.floating.stage import FloatingStage
@@ -50,11 +52,13 @@ def test_every_number_is_the_task_s_over_its_unit() -> None:
     length = 0.0475
     np.testing.assert_allclose(model.gravity, [0, 0, -1])
     np.testing.assert_allclose(model.inertia, np.array(task.object.inertia) / (0.2 * length**2), rtol=1e-11)
-    np.testing.assert_allclose(model.primitives[:, 6] * length, [0.015, 0.02])
-    np.testing.assert_allclose(
-        (model.primitives[0, 3:6] - model.primitives[0, :3]) * length, [0, 0.01, 0.06], atol=1e-14
-    )
-    np.testing.assert_allclose(model.patches * length, [f.touches for f in task.fingers.values()], atol=1e-12)
+    capsule, sphere = model.bodies
+    assert isinstance(capsule, Capsule)
+    assert isinstance(sphere, Sphere)
+    np.testing.assert_allclose([capsule.radius * length, sphere.radius * length], [0.015, 0.02])
+    np.testing.assert_allclose((capsule.end - capsule.start) * length, [0, 0.01, 0.06], atol=1e-14)
+    touches = [*(finger.touches for finger in task.fingers.values()), task.ground.touches]
+    np.testing.assert_allclose(model.patches * length, touches, atol=1e-12)
     assert model.palm_radius * length == pytest.approx(0.05)
     assert model.link_radius * length == pytest.approx(0.006)
     np.testing.assert_allclose(np.array(model.link_length) * length, [0.012, 0.1])
@@ -66,7 +70,7 @@ def test_every_number_is_the_task_s_over_its_unit() -> None:
     assert model.ground * length == pytest.approx(0.001)
     assert model.frictions[-1] == 0.4
     # The thumb and the index are on the capsule, the top finger on the sphere.
-    np.testing.assert_array_equal(model.capsules, model.primitives[[0, 0, 1]])
+    assert model.touched[:3] == (capsule, capsule, sphere)
 
 
 def test_goals_are_turns_from_the_first() -> None:
@@ -174,8 +178,12 @@ def test_a_drawing_has_points_for_goals() -> None:
 
 def same(one: object, other: object, name: str) -> None:
     if dataclasses.is_dataclass(one):
+        assert type(one) is type(other), name
         for field in dataclasses.fields(one):
             same(getattr(one, field.name), getattr(other, field.name), f"{name}.{field.name}")
+    elif isinstance(one, tuple) and isinstance(other, tuple):
+        for k, pair in enumerate(zip(one, other, strict=True)):
+            same(*pair, f"{name}[{k}]")
     else:
         assert np.array_equal(np.asarray(one), np.asarray(other)), name
 

@@ -13,7 +13,7 @@ from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.resampling import at_rest, extrapolated, resampled, resampled_model, shortened
 from casadi_hands.problem.scenario import Scenario
-from tests.stages.example import everything, project, standing
+from tests.stages.example import everything, project, rod, standing
 from tests.stages.refining import carrying
 
 Array = np.ndarray
@@ -177,7 +177,7 @@ def test_motions_go_on_as_they_have_grown(start: WholeHand) -> None:
     farther = extrapolated(model, still, start, 0.5)
     np.testing.assert_allclose(farther.position, start.position + 0.5 * (start.position - still.position))
     np.testing.assert_allclose(farther.angles[1], start.angles[1] + 0.5 * (start.angles[1] - start.angles[1][0]))
-    for contact, capsule in enumerate(model.capsules):
+    for contact, capsule in enumerate(map(rod, model.touched[: model.contacts])):
         expected = 1.5 * start.point[3, contact] - 0.5 * start.point[0, contact]
         np.testing.assert_allclose(farther.point[3, contact], project(expected, capsule)[0], atol=1e-9)
     np.testing.assert_array_equal(farther.force, start.force)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +11,7 @@ import pinocchio as pin
 from scipy.interpolate import BPoly, CubicHermiteSpline
 from scipy.spatial.transform import Rotation, Slerp
 
+from casadi_hands.geometry.bodies import Body
 from casadi_hands.kinematics.morphology import FingerSeed
 from casadi_hands.nlp import Solution, Solver
 from casadi_hands.problem.floating_motion import Floating
@@ -173,6 +174,24 @@ def cone(force: Array, inward: Array, friction: float, sharpness: float = 5.0) -
     x = sharpness * (np.linalg.norm(force - pressing * inward) - friction * pressing)
     above = max(x - 10, 0)
     return float(np.exp(min(x, 10)) * (1 + above + above**2 / 2))
+
+
+def rod(body: Body) -> Array:
+    """Both ends of the axis and the radius (7,) of a capsule, or of a sphere, whose ends are one."""
+    given = body.parameters
+    return given if len(given) == 7 else np.r_[given[:3], given]
+
+
+def marks(capsule: Array) -> Array:
+    """Ends and middle of an axis (3, 3), or its one point (1, 3) where it has no length."""
+    points = np.array([capsule[:3], (capsule[:3] + capsule[3:6]) / 2, capsule[3:6]])
+    return points if np.any(capsule[:3] != capsule[3:6]) else points[:1]
+
+
+def rods(bodies: Sequence[Body], parameters: Array) -> list[Array]:
+    """The same (7,) of each of some bodies' kinds, from their parameters in one row."""
+    parts = np.split(parameters, np.cumsum([body.width for body in bodies])[:-1])
+    return [rod(type(body).of(part)) for body, part in zip(bodies, parts, strict=True)]
 
 
 def nearest_on_axis(point: Array, capsule: Array) -> Array:

@@ -16,7 +16,7 @@ from casadi_hands.stages.refine.result import Refined
 from casadi_hands.stages.refine.settings import LAST_STEP
 from casadi_hands.stages.refine.stage import RefineStage
 from casadi_hands.stages.refine.values import Margin
-from tests.stages.example import drawing, everything, made_up_finger, made_up_solution, project
+from tests.stages.example import drawing, everything, made_up_finger, made_up_solution, project, rod
 
 Array = np.ndarray
 
@@ -40,9 +40,7 @@ class MadeUp:
     ) -> None:
         self.model, rng = model, np.random.default_rng(0)
         count = len(model.schedule.samples)
-        patches, capsules = model.patches, model.capsules
-        if model.ground is not None:
-            patches, capsules = np.vstack([patches, model.ground.patch]), np.vstack([capsules, model.ground.capsule])
+        patches, capsules = model.patches, np.array([rod(body) for body in model.touched])
         self.active = np.ones((count, len(patches)), bool)
         for contact, (first, last) in lifted.items():
             self.active[first:last, contact] = False

@@ -12,7 +12,7 @@ from casadi_hands.problem.si import build_model
 from casadi_hands.stages.floating.gate import least_squares_forces, needed_wrenches, passes_gate
 from casadi_hands.statics.grasp import friction_edges, grasp_map
 from casadi_hands.task import parse_task
-from tests.stages.example import Motion, everything, made_up_values, project
+from tests.stages.example import Motion, everything, made_up_values, project, rod
 
 BALL = """
 object: {{mass: 0.1, shapes: [{{sphere: {{center: [0, 0, 0], radius: 0.03}}}}]}}
@@ -62,8 +62,8 @@ def test_grasp_map_sums_forces_and_torques(rng: np.random.Generator) -> None:
 def test_normals_point_into_the_object(rng: np.random.Generator) -> None:
     _, model = everything()
     points = model.patches + 0.05 * rng.normal(size=model.patches.shape)
-    expected = [-project(p, c)[1] for p, c in zip(points, model.capsules, strict=True)]
-    np.testing.assert_allclose(inward_normals(points, model.capsules), expected, atol=1e-12)
+    expected = [-project(p, rod(body))[1] for p, body in zip(points, model.touched, strict=True)]
+    np.testing.assert_allclose(inward_normals(points, model.touched), expected, atol=1e-12)
 
 
 def test_edges_are_on_the_cone(rng: np.random.Generator) -> None:

@@ -7,13 +7,15 @@ import coal
 import numpy as np
 import pytest
 
+from casadi_hands.geometry.bodies.capsule import Capsule
+from casadi_hands.geometry.bodies.sphere import Sphere
 from casadi_hands.terms import clearance
 
 RADIUS = 0.1
 # A finger of three links, well away from what it is measured against.
 JOINTS = np.array([[0.2, 0, 0], [0.3, 0.2, 0.8], [0.1, 0.9, 1.3], [-0.6, 1.2, 1.2]])
 OTHER = np.array([[-0.7, 0, 0], [-0.9, -0.4, 0.9], [-0.2, -0.8, 1.6]])
-PRIMITIVES = np.array([[-1, 0, 2.2, 1, 0.2, 2.4, 0.3], [1.2, 1, 1, 1.2, 1, 1, 0.25]])
+BODIES = Capsule(np.array([-1, 0, 2.2]), np.array([1, 0.2, 2.4]), 0.3), Sphere(np.array([1.2, 1, 1]), 0.25)
 
 
 def links(points: np.ndarray) -> list[tuple[ca.DM, ca.DM]]:
@@ -40,9 +42,14 @@ def test_overlap_is_the_square_of_what_is_too_deep() -> None:
 
 
 def test_links_and_object() -> None:
-    found = np.asarray(clearance.links_and_object(links(JOINTS), ca.DM(RADIUS), ca.DM(PRIMITIVES.T))).ravel()
+    ends = [(ca.SX(a), ca.SX(b)) for a, b in itertools.pairwise(JOINTS)]
+    bodies = [type(body).surface(ca.SX(body.parameters)) for body in BODIES]
+    found = np.asarray(ca.evalf(clearance.links_and_object(ends, ca.SX(RADIUS), bodies))).ravel()
+    axes = [(BODIES[0].start, BODIES[0].end, 0.3), (BODIES[1].center, BODIES[1].center, 0.25)]
     expected = [
-        coal_distance(a, b, p[:3], p[3:6], RADIUS, p[6]) for a, b in itertools.pairwise(JOINTS) for p in PRIMITIVES
+        coal_distance(a, b, start, end, RADIUS, radius)
+        for a, b in itertools.pairwise(JOINTS)
+        for start, end, radius in axes
     ]
     np.testing.assert_allclose(found, expected, atol=5e-4)
 

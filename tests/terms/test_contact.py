@@ -4,6 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from casadi_hands.geometry.bodies.capsule import Capsule
 from casadi_hands.terms import contact
 
 ROUNDED = 1e-3  # what ‖f‖ is at f = 0
@@ -50,9 +51,9 @@ def test_gap_rate_sees_the_gap_and_slip_the_sliding(rng: np.random.Generator) ->
     found = np.asarray(contact.slip(*dm(force, 0.4, point, before, 0.1))).ravel()
     np.testing.assert_allclose(found, size * (point - before) / 0.1, rtol=1e-5)
     # Sliding along the surface leaves the gap as it is: eq. 2.12 is blind to it.
-    capsule = ca.DM([0, 0, -1, 0, 0, 1, 0.3])
+    capsule = Capsule.surface(ca.SX([0, 0, -1, 0, 0, 1, 0.3]))
     high, low = (np.array([0.31, 0, z]) for z in (0.2, -0.2))
-    gaps = [contact.surface(*dm(p), capsule)[0] - ca.DM(p) for p in (high, low)]
+    gaps = [ca.evalf(capsule.project(ca.SX(p))[0]) - ca.DM(p) for p in (high, low)]
     assert float(ca.norm_2(contact.gap_rate(*dm(force, 1.0), *gaps, ca.DM(0.1)))) < 1e-5
     assert float(ca.norm_2(contact.slip(*dm(force, 1.0, high, low, 0.1)))) == pytest.approx(
         np.linalg.norm(force) * 4, rel=1e-5

@@ -18,7 +18,7 @@ from casadi_hands.stages.floating.regrasp import FARTHEST, limited_travel, plann
 from casadi_hands.stages.floating.stage import BARRIERS, LIMITED_TRAVEL, FloatingStage, solve_floating
 from casadi_hands.stages.object_motion.values import straight_path
 from casadi_hands.task import parse_task
-from tests.stages.example import made_up_solution
+from tests.stages.example import made_up_solution, rod
 
 Array = np.ndarray
 
@@ -61,7 +61,7 @@ def test_only_the_contact_off_the_axis_lets_go_and_takes_the_object_where_it_fir
     # The object's axis has another direction then: on its surface, as near as that lets it be.
     cosine = direction @ first / np.linalg.norm(direction) / np.linalg.norm(first)
     assert np.arccos(cosine) < np.radians(20)
-    capsule = model.capsules[2]
+    capsule = rod(model.touched[2])
     along = np.linspace(0, 1, 10001)[:, None]
     axis = capsule[:3] + along * (capsule[3:6] - capsule[:3])
     distance = np.linalg.norm(plan.patches[3, 2] - axis, axis=1).min()

@@ -17,7 +17,7 @@ from casadi_hands.stages.floating.gate import passes_gate
 from casadi_hands.stages.floating.stage import BARRIERS, BROKEN, FloatingStage
 from casadi_hands.task import Task, load_task, parse_task
 from tests.problem.test_model import rotations
-from tests.stages.example import Motion, drawing, palm_apart, project, resting_at, spline_at
+from tests.stages.example import Motion, drawing, palm_apart, project, resting_at, rod, spline_at
 
 PROBLEMS = Path(__file__).parents[3] / "problems"
 Solved = tuple[Task, Model, Floating]
@@ -87,7 +87,7 @@ def test_friction_is_respected_at_every_sample(any_of_them: Solved) -> None:
     active = floating.active[np.searchsorted(schedule.keyframes, schedule.samples + 1e-9) - 1]
     assert active.sum(axis=1).min() >= 2
     for s, c in zip(*np.nonzero(active), strict=True):
-        inward = -project(points[s, c], model.capsules[c])[1]
+        inward = -project(points[s, c], rod(model.touched[c]))[1]
         pressing = floating.force[s, c] @ inward
         across = np.linalg.norm(floating.force[s, c] - pressing * inward)
         assert across <= model.friction * pressing
@@ -97,7 +97,7 @@ def test_friction_is_respected_at_every_sample(any_of_them: Solved) -> None:
 def test_contacts_are_on_the_object_near_where_the_user_put_them(any_of_them: Solved) -> None:
     _, model, floating = any_of_them
     for keyframe in floating.point:
-        for point, capsule, patch in zip(keyframe, model.capsules, model.patches, strict=True):
+        for point, capsule, patch in zip(keyframe, map(rod, model.touched), model.patches, strict=True):
             assert np.linalg.norm(project(point, capsule)[0] - point) < 0.02
             assert np.linalg.norm(point - patch) < 0.2
 

@@ -31,9 +31,11 @@ from tests.stages.example import (
     g,
     linear_at,
     made_up_values,
+    marks,
     palm_apart,
     project,
     resting_at,
+    rod,
     spline_at,
 )
 
@@ -136,14 +138,14 @@ class Witness:
         return float(total)
 
     def palm_clearance(self) -> float:
-        """Ends and middle of each primitive's axis against palm (0.02 lengths apart) and ground."""
+        """Ends and middle of each body's axis against palm (0.02 lengths apart) and ground."""
         model, total = self.model, 0.0
         positions, orientations = self.motion.at(0)
         for s, (position, turn) in enumerate(zip(positions, orientations, strict=True)):
             palm = rotations(model.palm_quaternion[s])
-            for capsule in model.primitives:
-                for share in (0, 0.5, 1):
-                    point = position + turn.apply((1 - share) * capsule[:3] + share * capsule[3:6])
+            for capsule in map(rod, model.bodies):
+                for mark in marks(capsule):
+                    point = position + turn.apply(mark)
                     seen = palm.inv().apply(point - model.palm_position[s])
                     total += float(g(0.02 + capsule[6] - palm_apart(seen, model.palm_radius)))
                     if model.ground is not None:
@@ -154,9 +156,10 @@ class Witness:
         model, forces = self.model, self.forces[suffix]
         total = dict.fromkeys(FORCE_TERMS if model.ground is not None else FORCE_TERMS - GROUND_TERMS, 0.0)
         orientations = self.motion.at(0)[1]
-        zeros = np.zeros_like(model.disturbance.force)
-        push = model.disturbance.force if suffix else zeros
-        twist = model.disturbance.torque if suffix else zeros
+        push = twist = np.zeros((len(orientations), 3))
+        if suffix:
+            assert model.disturbance is not None
+            push, twist = model.disturbance.force, model.disturbance.torque
         acceleration, torque_of_motion = self.motion.acceleration, self.motion.inertial_torque
         for s, turn in enumerate(orientations):
             c, force, point = self.invariant[s], forces[s], self.points[1][s]
@@ -175,10 +178,10 @@ class Witness:
     def finger_contact(self, total: dict[str, float], s: int, i: int, force: Array, c: float) -> None:
         model, h = self.model, self.schedule.step
         point, before = self.points[1][s, i], self.points[0][s, i]
-        (projection, normal), size = project(point, model.capsules[i]), np.linalg.norm(force)
+        (projection, normal), size = project(point, rod(model.touched[i])), np.linalg.norm(force)
         total["friction_cone"] += c * cone(force, -normal, model.friction)
         total["contact_on_object"] += size * c * ((projection - point) ** 2).sum()
-        gap_rate = ((projection - point) - (project(before, model.capsules[i])[0] - before)) / h
+        gap_rate = ((projection - point) - (project(before, rod(model.touched[i]))[0] - before)) / h
         total["slip_on_object"] += (c * size) ** 2 * (gap_rate**2).sum()
         total["tangential_slip"] += (c * size) ** 2 * (((point - before) / h) ** 2).sum()
 
@@ -190,7 +193,7 @@ class Witness:
         (position, turn), (position_before, turn_before) = (
             (p[s], r[s]) for p, r in (self.motion.at(0), self.motion.at(-1))
         )
-        projection, normal = project(point, model.ground.capsule)
+        projection, normal = project(point, rod(model.touched[-1]))
         in_world = position + turn.apply(point)
         moved = in_world - position_before - turn_before.apply(point)
         total["ground_friction_cone"] += c * cone(turn.apply(force), np.array([0, 0, 1]), model.frictions[-1])
@@ -349,7 +352,7 @@ def test_every_contact_force_is_held_in_its_cone(full: Case, suffix: str) -> Non
             if name == "ground":
                 inward, friction = turn.inv().apply([0, 0, 1]), model.frictions[-1]
             else:
-                inward = -project(witness.points[1][s, c], model.capsules[c])[1]
+                inward = -project(witness.points[1][s, c], rod(model.touched[c]))[1]
             across = np.linalg.norm(np.cross(force, inward))
             # Rounded to the safe side where nothing acts across the normal.
             margins.append(friction * force @ inward - np.hypot(across, 1e-3))

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from casadi_hands.geometry.bodies.capsule import Capsule
+from casadi_hands.geometry.bodies.sphere import Sphere
 from casadi_hands.kinematics.morphology import FingerSeed
 from casadi_hands.stages.refine import finger_kernels
 from tests.stages.blocks import (
@@ -51,7 +53,7 @@ class Contact:
     @property
     def scene(self) -> dict[str, object]:
         parameters = {"frames": frames(self.finger), **self.place.parameters}
-        return {**parameters, "capsule": self.capsule, "radius": self.radius}
+        return {**parameters, "body": self.capsule, "radius": self.radius}
 
     @property
     def contact(self) -> Block:
@@ -84,15 +86,14 @@ class Contact:
 def test_a_contact_s_numbers_are_those_of_numpy_and_pinocchio(joints: int, seed: int) -> None:
     case = Contact(joints, seed)
     finger, place, normal, force = case.finger, case.place, case.normal, case.force
-    found = numbers(finger_kernels.contact(joints, limited=True), *case.contact)
+    found = numbers(finger_kernels.contact(joints, Capsule, limited=True), *case.contact)
     chain, link = PinFinger(finger, case.radius).chain(finger.angles[0])
     on_link = link.T @ (place.in_palm(case.point) - chain[-2])
     # Kinks of capsules are rounded by a thousandth of their length.
     np.testing.assert_allclose(found["on_object"], case.off_object, atol=1e-5)
     axis = np.array([0, 0, 0, 0, 0, finger.lengths[-1], case.radius])
     from_link = place.turn.inv().apply(place.palm.apply(link @ (on_link - nearest_on_axis(on_link, axis))))
-    from_object = case.point - nearest_on_axis(case.point, case.capsule)
-    np.testing.assert_allclose(found["on_link"], from_link + case.radius / 0.3 * from_object, atol=5e-3)
+    np.testing.assert_allclose(found["on_link"], from_link + case.radius * normal, atol=5e-3)
     pressing = -force @ normal
     np.testing.assert_allclose(found["pressing"], pressing, atol=2e-3)
     across = force + pressing * normal
@@ -136,7 +137,7 @@ def test_surfaces_touch_where_normals_are_opposed(joints: int, share: float, out
     case.place.vector = (turn * case.place.reference.inv()).as_rotvec()
     touched = case.place.palm.apply(on_axis + case.radius * link_normal) + case.place.palm_position
     case.place.position = touched - turn.apply(case.point)
-    found = numbers(finger_kernels.contact(joints, limited=True), *case.contact)
+    found = numbers(finger_kernels.contact(joints, Capsule, limited=True), *case.contact)
     np.testing.assert_allclose(found["on_object"], 0, atol=1e-5)
     # From within the object, the link's axis is a diameter away from where it should be.
     off = found["on_link"]
@@ -146,27 +147,27 @@ def test_surfaces_touch_where_normals_are_opposed(joints: int, share: float, out
 @pytest.mark.parametrize("joints", [1, 2, 3])
 def test_a_second_force_is_held_as_the_first(joints: int) -> None:
     case = Contact(joints, 7)
-    first = numbers(finger_kernels.contact(joints, limited=True), *case.contact)
-    second = numbers(finger_kernels.disturbed_contact(joints, limited=True), *case.disturbed)
+    first = numbers(finger_kernels.contact(joints, Capsule, limited=True), *case.contact)
+    second = numbers(finger_kernels.disturbed_contact(joints, Capsule, limited=True), *case.disturbed)
     assert set(second) == {"pressing", "cone", "structural", "torque", "passive_force"}
     for name, value in second.items():
         np.testing.assert_allclose(value, first[name], rtol=1e-12, atol=1e-12)
-    third = numbers(finger_kernels.actuated(joints), *case.actuated)
+    third = numbers(finger_kernels.actuated(joints, Capsule), *case.actuated)
     assert set(third) == {"structural", "passive_force"}
     for name, value in third.items():
         np.testing.assert_allclose(value, first[name], rtol=1e-12, atol=1e-12)
     # Turned about the normal, the force is as well within the cone; doubled, four times as far from its edge.
     turn = Rotation.from_rotvec(1.1 * case.normal)
     case.force = 2 * turn.apply(case.force)
-    other = numbers(finger_kernels.disturbed_contact(joints, limited=True), *case.disturbed)
+    other = numbers(finger_kernels.disturbed_contact(joints, Capsule, limited=True), *case.disturbed)
     np.testing.assert_allclose(other["pressing"], 2 * second["pressing"], rtol=1e-3)
     np.testing.assert_allclose(other["cone"], 4 * second["cone"], rtol=1e-2)
 
 
 def test_torque_is_a_constraint_only_where_it_is_limited() -> None:
-    assert "torque" in finger_kernels.contact(2, limited=True).constraints
-    assert "torque" not in finger_kernels.contact(2, limited=False).constraints
-    assert "torque" not in finger_kernels.disturbed_contact(2, limited=False).constraints
+    assert "torque" in finger_kernels.contact(2, Capsule, limited=True).constraints
+    assert "torque" not in finger_kernels.contact(2, Capsule, limited=False).constraints
+    assert "torque" not in finger_kernels.disturbed_contact(2, Capsule, limited=False).constraints
     assert "speed" in finger_kernels.joint_motion(2, limited=True).constraints
     assert "speed" not in finger_kernels.joint_motion(2, limited=False).constraints
 
@@ -190,7 +191,7 @@ Knot = tuple[Array, Rotation, Array, float]
 
 def rolls(before: Knot, after: Knot) -> dict[str, Array]:
     """The rolling block of a ball at (position, orientation, contact in the palm frame, finger's angle) twice."""
-    return numbers(finger_kernels.rolling(1), *rolling_block(before, after))
+    return numbers(finger_kernels.rolling(1, Sphere), *rolling_block(before, after))
 
 
 def rolling_block(before: Knot, after: Knot) -> Block:
@@ -199,7 +200,7 @@ def rolling_block(before: Knot, after: Knot) -> Block:
         point = turn.inv().apply(contact - position)
         knots |= {f"pose{i}": np.r_[position, turn.as_rotvec()], f"point{i}": point, f"angles{i}": angle}
         scenes |= {f"reference{i}": STILL, f"palm_position{i}": np.zeros(3), f"palm_quaternion{i}": STILL}
-        scenes |= {f"capsule{i}": [0, 0, 0, 0, 0, 0, BALL], f"radius{i}": TIP}
+        scenes |= {f"body{i}": [0, 0, 0, BALL], f"radius{i}": TIP}
     across = np.cross(before[2] - before[0], [0, 1, 0])
     helper = before[1].inv().apply(across)
     parameters = {"frames": frames(UPRIGHT), **scenes, "helper": helper, "step": STEP}
@@ -269,7 +270,7 @@ RADIUS, PALM_RADIUS, GROUND = 0.1, 1.2, -0.4
 
 
 def clearance_block(finger: FingerSeed, place: Place, primitives: Array) -> Block:
-    parameters = {"radius": RADIUS, "palm_radius": PALM_RADIUS, "ground_height": GROUND, "primitives": primitives}
+    parameters = {"radius": RADIUS, "palm_radius": PALM_RADIUS, "ground_height": GROUND, "bodies": primitives.ravel()}
     variables = {**shape(finger), "pose": place.pose, "angles": finger.angles[0]}
     return variables, {"frames": frames(finger), **place.parameters, **parameters}
 
@@ -286,7 +287,7 @@ def test_clearances_of_a_finger_are_those_of_coal(touched: int | None, grounded:
         rng = np.random.default_rng(seed)
         finger, place = random_finger(joints, rng), Place(rng)
         primitives = np.hstack([rng.normal(size=(2, 6)), [[0.2], [0.3]]])
-        kernel = finger_kernels.apart(joints, 2, touched, grounded)
+        kernel = finger_kernels.apart(joints, (Capsule, Capsule), touched, grounded)
         found = numbers(kernel, *clearance_block(finger, place, primitives))["clear"]
         links = PinFinger(finger, RADIUS).links(finger.angles[0])
         expected = [palm_apart(links[0][1], PALM_RADIUS) - RADIUS]
@@ -357,12 +358,12 @@ def test_derivatives_agree_with_differences() -> None:
     primitives = np.hstack([rng.normal(size=(2, 6)), [[0.2], [0.3]]])
     angles = rng.normal(size=(3, 2))
     for kernel, (variables, parameters) in (
-        (finger_kernels.contact(2, limited=True), case.contact),
-        (finger_kernels.contact(3, limited=True), Contact(3, 1).contact),
-        (finger_kernels.disturbed_contact(2, limited=True), case.disturbed),
-        (finger_kernels.actuated(2), case.actuated),
-        (finger_kernels.rolling(1), rolling_block(before, after)),
-        (finger_kernels.apart(2, 2, 1, grounded=True), clearance_block(one, place, primitives)),
+        (finger_kernels.contact(2, Capsule, limited=True), case.contact),
+        (finger_kernels.contact(3, Capsule, limited=True), Contact(3, 1).contact),
+        (finger_kernels.disturbed_contact(2, Capsule, limited=True), case.disturbed),
+        (finger_kernels.actuated(2, Capsule), case.actuated),
+        (finger_kernels.rolling(1, Sphere), rolling_block(before, after)),
+        (finger_kernels.apart(2, (Capsule, Capsule), 1, grounded=True), clearance_block(one, place, primitives)),
         (finger_kernels.fingers_apart(2, 3), pair_block(one, other)),
         (
             finger_kernels.joint_motion(2, limited=True),
@@ -376,9 +377,9 @@ def test_derivatives_agree_with_differences() -> None:
 def test_derivatives_are_finite_where_nothing_moves_and_nothing_presses() -> None:
     # The object where its reference is, the finger straight up and on its seed axes, a contact with no force.
     knot = on_cap(0.3, 0.0)
-    check_block(finger_kernels.rolling(1), *rolling_block(knot, knot), h=1e-6)
+    check_block(finger_kernels.rolling(1, Sphere), *rolling_block(knot, knot), h=1e-6)
     case = Contact(2, 0)
     case.finger = replace(case.finger, axes=np.zeros((2, 2)), angles=np.zeros((1, 2)))
     case.place.vector, case.force = np.zeros(3), np.zeros(3)
-    check_block(finger_kernels.contact(2, limited=True), *case.contact, h=1e-6)
-    check_block(finger_kernels.disturbed_contact(2, limited=True), *case.disturbed, h=1e-6)
+    check_block(finger_kernels.contact(2, Capsule, limited=True), *case.contact, h=1e-6)
+    check_block(finger_kernels.disturbed_contact(2, Capsule, limited=True), *case.disturbed, h=1e-6)

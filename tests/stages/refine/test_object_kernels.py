@@ -8,6 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
+from casadi_hands.geometry.bodies.capsule import Capsule
 from casadi_hands.stages.refine import object_kernels as body
 from tests.stages.blocks import STEP, STILL, Place, check_block, coal_distance, numbers, segment, surface
 from tests.stages.example import palm_apart
@@ -215,14 +216,14 @@ class Lying:
 
 
 def touching(lying: Lying, point: Array, force: Array) -> Block:
-    parameters = {"reference": lying.quaternion, "capsule": CAPSULE, "ground_height": HEIGHT, "friction": MU}
+    parameters = {"reference": lying.quaternion, "body": CAPSULE, "ground_height": HEIGHT, "friction": MU}
     wanted = {"wanted_point": point + 0.1, "wanted_force": force - [0, 0, 0.2]}
     return {"pose": lying.pose, "point": point, "force": force}, {**parameters, **wanted}
 
 
 def slipping(before: Lying, point: Array, after: Lying, point_after: Array) -> Block:
     variables = {"pose0": before.pose, "point0": point, "pose1": after.pose, "point1": point_after}
-    return variables, {"reference": before.quaternion, "capsule": CAPSULE, "step": STEP}
+    return variables, {"reference": before.quaternion, "body": CAPSULE, "step": STEP}
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
@@ -230,7 +231,7 @@ def slipping(before: Lying, point: Array, after: Lying, point_after: Array) -> B
 def test_a_capsule_that_lies_on_the_ground_touches_it(seed: int, share: float) -> None:
     lying = Lying(seed)
     point, force = lying.beneath(share), lying.turn.inv().apply([0.2, -0.1, 0.7])
-    found = numbers(body.ground_contact(), *touching(lying, point, force))
+    found = numbers(body.ground_contact(Capsule), *touching(lying, point, force))
     np.testing.assert_allclose(found["on_surfaces"], 0, atol=1e-5)
     np.testing.assert_allclose(found["opposed"], 0, atol=1e-5)
     np.testing.assert_allclose(found["facing"], -1, atol=1e-9)
@@ -240,13 +241,13 @@ def test_a_capsule_that_lies_on_the_ground_touches_it(seed: int, share: float) -
     np.testing.assert_allclose(found["stay_force"], 0.2**2, rtol=1e-9)
     # Higher up its point is as far above the ground, and on the object still; at its side it faces sideways.
     lying.lift(0.15)
-    found = numbers(body.ground_contact(), *touching(lying, lying.beneath(share), force))
+    found = numbers(body.ground_contact(Capsule), *touching(lying, lying.beneath(share), force))
     np.testing.assert_allclose(found["on_surfaces"], [0, 0.15], atol=1e-5)
     lying.lift(0.0)
     along = lying.turn.apply(CAPSULE[3:6] - CAPSULE[:3]) / np.linalg.norm(CAPSULE[3:6] - CAPSULE[:3])
     aside = np.cross(along, [0, 0, 1])
     side = lying.turn.inv().apply(lying.axis_point(share) + CAPSULE[6] * aside - lying.position)
-    found = numbers(body.ground_contact(), *touching(lying, side, force))
+    found = numbers(body.ground_contact(Capsule), *touching(lying, side, force))
     np.testing.assert_allclose(found["on_surfaces"], [0, CAPSULE[6]], atol=1e-5)
     np.testing.assert_allclose(found["opposed"], aside[:2], atol=1e-5)
     np.testing.assert_allclose(found["facing"], 0, atol=1e-5)
@@ -257,10 +258,10 @@ def test_a_ground_contact_s_numbers_are_those_of_scipy_s_rotations(seed: int) ->
     rng = np.random.default_rng(seed)
     place, (point, force, wanted_point, wanted_force) = Place(rng), rng.normal(size=(4, 3))
     reference = place.parameters["reference"]
-    parameters = {"reference": reference, "capsule": CAPSULE, "ground_height": HEIGHT, "friction": MU}
+    parameters = {"reference": reference, "body": CAPSULE, "ground_height": HEIGHT, "friction": MU}
     wanted = {"wanted_point": wanted_point, "wanted_force": wanted_force}
     variables = {"pose": place.pose, "point": point, "force": force}
-    found = numbers(body.ground_contact(), variables, {**parameters, **wanted})
+    found = numbers(body.ground_contact(Capsule), variables, {**parameters, **wanted})
     off_object, normal = surface(point, CAPSULE)
     outward, exerted = place.turn.apply(normal), place.turn.apply(force)
     np.testing.assert_allclose(found["on_surfaces"], [off_object, place.in_world(point)[2] - HEIGHT], atol=1e-5)
@@ -286,12 +287,12 @@ def test_a_capsule_that_rolls_on_the_ground_slips_only_to_fifth_order(angle: flo
     along /= np.linalg.norm(along)
     path = radius * angle * np.cross(along, [0, 0, 1])
     after = before.moved(Rotation.from_rotvec(angle * along), before.axis_point(0.0), path[:2])
-    found = numbers(body.ground_rolling(), *slipping(before, before.beneath(share), after, after.beneath(share)))
+    found = numbers(body.ground_rolling(Capsule), *slipping(before, before.beneath(share), after, after.beneath(share)))
     lack = radius * abs(angle) * 1.5 * (angle**2 / 8) ** 2
     assert np.linalg.norm(found["no_slip"]) == pytest.approx(lack, rel=0.1, abs=1e-7)
     # Without the path it spins in its place: its surface slides by the arc.
     spun = before.moved(Rotation.from_rotvec(angle * along), before.axis_point(0.0))
-    found = numbers(body.ground_rolling(), *slipping(before, before.beneath(share), spun, spun.beneath(share)))
+    found = numbers(body.ground_rolling(Capsule), *slipping(before, before.beneath(share), spun, spun.beneath(share)))
     slid = radius * abs(angle)
     assert np.linalg.norm(found["no_slip"]) == pytest.approx(slid, rel=2e-3)
     assert found["slip"][0] == pytest.approx((slid / STEP) ** 2, rel=4e-3)
@@ -307,7 +308,7 @@ def test_a_capsule_that_tips_over_its_cap_rolls(angle: float) -> None:
     path = radius * abs(angle) * np.cross(-across, [0, 0, 1])
     after = before.moved(tipped, before.axis_point(0.0), path[:2])
     assert after.axis_point(1.0)[2] > after.axis_point(0.0)[2] + 0.05
-    found = numbers(body.ground_rolling(), *slipping(before, before.beneath(0.0), after, after.beneath(0.0)))
+    found = numbers(body.ground_rolling(Capsule), *slipping(before, before.beneath(0.0), after, after.beneath(0.0)))
     lack = radius * abs(angle) * 1.5 * (angle**2 / 8) ** 2
     assert np.linalg.norm(found["no_slip"]) == pytest.approx(lack, rel=0.3, abs=1e-6)
 
@@ -317,11 +318,11 @@ def test_a_capsule_that_pivots_slips_wherever_the_pivot_is_not(angle: float) -> 
     before = Lying(3)
     turn = Rotation.from_rotvec([0, 0, angle])
     after = before.moved(turn, before.axis_point(0.3))
-    found = numbers(body.ground_rolling(), *slipping(before, before.beneath(0.3), after, after.beneath(0.3)))
+    found = numbers(body.ground_rolling(Capsule), *slipping(before, before.beneath(0.3), after, after.beneath(0.3)))
     np.testing.assert_allclose(found["no_slip"], 0, atol=1e-12)
     np.testing.assert_allclose(found["slip"], 0, atol=1e-20)
     # A point at a distance from the pivot moves by the chord of its turn.
-    found = numbers(body.ground_rolling(), *slipping(before, before.beneath(0.8), after, after.beneath(0.8)))
+    found = numbers(body.ground_rolling(Capsule), *slipping(before, before.beneath(0.8), after, after.beneath(0.8)))
     chord = 0.5 * np.linalg.norm(CAPSULE[3:6] - CAPSULE[:3]) * 2 * abs(np.sin(angle / 2))
     assert np.linalg.norm(found["no_slip"]) == pytest.approx(chord, rel=1e-9)
 
@@ -329,11 +330,11 @@ def test_a_capsule_that_pivots_slips_wherever_the_pivot_is_not(angle: float) -> 
 def test_a_capsule_that_slides_slips_by_its_path_and_one_that_lies_still_does_not() -> None:
     before, by = Lying(4), (0.03, -0.04)
     after = before.moved(Rotation.identity(), np.zeros(3), by)
-    found = numbers(body.ground_rolling(), *slipping(before, before.beneath(0.5), after, after.beneath(0.5)))
+    found = numbers(body.ground_rolling(Capsule), *slipping(before, before.beneath(0.5), after, after.beneath(0.5)))
     np.testing.assert_allclose(found["no_slip"], [-0.03, 0.04], atol=1e-12)
     np.testing.assert_allclose(found["slip"], (0.05 / STEP) ** 2, rtol=1e-9)
     # Its contact may wander along the line on which it lies.
-    found = numbers(body.ground_rolling(), *slipping(before, before.beneath(0.2), before, before.beneath(0.7)))
+    found = numbers(body.ground_rolling(Capsule), *slipping(before, before.beneath(0.2), before, before.beneath(0.7)))
     np.testing.assert_allclose(found["no_slip"], 0, atol=1e-12)
 
 
@@ -341,7 +342,7 @@ def test_a_capsule_that_slides_slips_by_its_path_and_one_that_lies_still_does_no
 
 
 def clear_block(place: Place, primitives: Array, palm_radius: float = 0.8, ground: float = -0.6) -> Block:
-    sizes = {"palm_radius": palm_radius, "ground_height": ground, "primitives": primitives}
+    sizes = {"palm_radius": palm_radius, "ground_height": ground, "bodies": primitives.ravel()}
     return {"pose": place.pose}, {**place.parameters, **sizes}
 
 
@@ -364,7 +365,7 @@ def test_the_object_s_clearances_are_those_of_coal() -> None:
         ends[0] = starts[0]  # a sphere
         radii = rng.uniform(0.1, 0.4, 2)
         primitives = np.hstack([starts, ends, radii[:, None]])
-        found = numbers(body.object_apart(2, True), *clear_block(place, primitives))
+        found = numbers(body.object_apart((Capsule, Capsule), True), *clear_block(place, primitives))
         palm, ground = found["palm"].reshape(2, 3), found["ground"].reshape(2, 2)
         for k in range(2):
             from_palm, from_ground = seen_by_coal(place, starts[k], ends[k], radii[k], 0.8)
@@ -386,7 +387,7 @@ def test_the_object_s_clearances_are_signed() -> None:
             place.turn.inv().apply(place.palm.apply(p) + place.palm_position - place.position)
             for p in rng.uniform([-1, -1, -0.7], [1, 1, 0.3], (2, 3))
         )
-        found = numbers(body.object_apart(1, False), *clear_block(place, np.r_[start, end, 0.2]))
+        found = numbers(body.object_apart((Capsule,), False), *clear_block(place, np.r_[start, end, 0.2]))
         points = [place.in_palm(p) for p in (start, (start + end) / 2, end)]
         np.testing.assert_allclose(found["palm"], [palm_apart(p, 0.8) - 0.2 for p in points], atol=1e-5)
     assert "ground" not in found
@@ -427,10 +428,10 @@ def test_derivatives_agree_with_differences() -> None:
         (body.force_change(2), ({"force0": forces[:6], "force1": forces[6:]}, {})),
         (body.near_path(), ({"pose": place.pose}, {"wanted_pose": rng.normal(size=6)})),
         (body.meet_goal(), ({"pose": place.pose}, {"goal_pose": rng.normal(size=6)})),
-        (body.ground_contact(), touching(lying, lying.beneath(0.4) + 0.1, force)),
+        (body.ground_contact(Capsule), touching(lying, lying.beneath(0.4) + 0.1, force)),
         (body.disturbed_ground(), ({"pose": place.pose, "force": force}, {**reference, "friction": MU})),
-        (body.ground_rolling(), slipping(lying, lying.beneath(0.4), after, after.beneath(0.6))),
-        (body.object_apart(2, True), clear_block(place, primitives)),
+        (body.ground_rolling(Capsule), slipping(lying, lying.beneath(0.4), after, after.beneath(0.6))),
+        (body.object_apart((Capsule, Capsule), True), clear_block(place, primitives)),
         (body.tool_point(), ({"pose": place.pose}, {**reference, "tool": force, "target": torque})),
     ):
         check_block(kernel, variables, parameters)
@@ -441,8 +442,8 @@ def test_derivatives_are_finite_where_nothing_moves_and_nothing_presses() -> Non
     lying.reference = lying.turn
     assert np.abs(lying.pose[3:]).max() == 0
     point = lying.beneath(0.5)
-    check_block(body.ground_contact(), *touching(lying, point, np.zeros(3)), h=1e-6)
-    check_block(body.ground_rolling(), *slipping(lying, point, lying, point), h=1e-6)
+    check_block(body.ground_contact(Capsule), *touching(lying, point, np.zeros(3)), h=1e-6)
+    check_block(body.ground_rolling(Capsule), *slipping(lying, point, lying, point), h=1e-6)
     variables, parameters = Carried(0).physics()
     still = {name: np.zeros_like(value) for name, value in variables.items()}
     check_block(body.physics(), still, {**parameters, "reference": STILL}, h=1e-6)

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
+from casadi_hands.geometry.bodies import packed
 from casadi_hands.problem.resampling import resampled_model
 from casadi_hands.problem.structure import Inner, Structure
 from casadi_hands.stages.object_motion.values import tool_path
 from casadi_hands.stages.refine import finger_kernels
 from casadi_hands.stages.refine.settings import WEIGHTS
 from tests.stages.blocks import frames, numbers, surface
-from tests.stages.example import check_derivatives, doubling_each_weight, drawing, everything
+from tests.stages.example import check_derivatives, doubling_each_weight, drawing, everything, rod
 from tests.stages.refining import MadeUp, carrying, sketching
 
 Array = np.ndarray
@@ -125,7 +126,7 @@ def test_the_ground_is_where_it_is_while_it_bears_load(loaded: MadeUp) -> None:
     exerted = np.array([r.apply(f) for r, f in zip(loaded.turns, loaded.forces[:, 2], strict=True)])
     touching = np.flatnonzero(loaded.touching[:, 2])
     assert touching.tolist() == list(range(10))
-    height, capsule = 0.001 / 0.0475, loaded.model.ground.capsule  # type: ignore[union-attr]
+    height, capsule = 0.001 / 0.0475, rod(loaded.model.touched[-1])
     np.testing.assert_allclose(found["ground.on_surfaces"][:, 1], world[touching, 2] - height, atol=1e-12)
     np.testing.assert_allclose(found["ground.pressing"].ravel(), exerted[touching, 2], atol=1e-12)
     # Half the ground's friction of 0.4 may be used.
@@ -180,11 +181,11 @@ def test_forces_are_actuated_in_the_middle_between_knots_too(loaded: MadeUp) -> 
                 "reference": model.reference,
                 "palm_position": (model.palm_position[k] + model.palm_position[k + 1]) / 2,
                 "palm_quaternion": turning(k + 0.5).as_quat(scalar_first=True),
-                "capsule": model.capsules[c],
+                "body": model.touched[c].parameters,
                 "radius": model.link_radius,
             }
             variables |= dict(zip(("pose", "point", "angles", "force"), middles, strict=True))
-            expected = numbers(finger_kernels.actuated(finger.joints), variables, parameters)
+            expected = numbers(finger_kernels.actuated(finger.joints, type(model.touched[c])), variables, parameters)
             np.testing.assert_allclose(row, expected["structural"], atol=1e-12)
 
 
@@ -194,7 +195,7 @@ def test_lifted_fingers_are_clear_in_the_middle_between_knots_too(loaded: MadeUp
     turning = Slerp(np.arange(len(palms)), palms)
     intervals = np.flatnonzero(~loaded.active[:-1, 2])
     assert len(found["apart_between2.clear"]) == len(intervals) > 0
-    kernel = finger_kernels.apart(2, len(model.primitives), None, model.ground is not None)
+    kernel = finger_kernels.apart(2, model.kinds, None, model.ground is not None)
     for row, k in zip(found["apart_between2.clear"], intervals, strict=True):
         variables = {name: values[f"{name}2"] for name in ("base", "lengths", "axes")}
         variables |= {
@@ -208,7 +209,7 @@ def test_lifted_fingers_are_clear_in_the_middle_between_knots_too(loaded: MadeUp
             "radius": model.link_radius,
             "palm_radius": model.palm_radius,
             "ground_height": model.ground_height,
-            "primitives": model.primitives,
+            "bodies": packed(model.bodies),
         }
         np.testing.assert_allclose(row, numbers(kernel, variables, parameters)["clear"], atol=1e-12)
 

@@ -29,7 +29,7 @@ from casadi_hands.stages.refine.values import TOOL_TOLERANCE, Margin, RefineValu
 from casadi_hands.task import Task, load_task
 from casadi_hands.terms import constraints as limits
 from casadi_hands.verify import Audit, audit_files
-from tests.stages.example import STAND, project
+from tests.stages.example import STAND, project, rod
 from tests.stages.refining import MadeUp, carrying, sketching
 from tests.stages.searched import whole_hand_of_two_joints
 
@@ -336,7 +336,7 @@ def test_the_margins_are_kept(solved: Solved) -> None:
     for s, c in zip(*np.nonzero(motion.contact_active), strict=True):
         turn = Rotation.from_quat(motion.object_orientation[s], scalar_first=True)
         force = turn.inv().apply(motion.contact_force[s, c])
-        capsule = solved.model.capsules[c] * solved.model.units.length
+        capsule = rod(solved.model.touched[c]) * solved.model.units.length
         inward = -project(motion.contact_point_object[s, c], capsule)[1]
         pressing = force @ inward
         assert pressing >= (margin.normal_force - 1e-3) * weight

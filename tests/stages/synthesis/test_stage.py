@@ -21,6 +21,7 @@ from tests.stages.example import (
     made_up_finger,
     made_up_floating,
     palm_apart,
+    rods,
     segments_apart,
     torques,
     unsupplied,
@@ -104,7 +105,7 @@ class Witness:
 
     def collision(self) -> float:
         model, total = self.model, 0.0
-        primitives, up, ground = self.target.scene(self.collision_times)
+        bodies, up, ground = self.target.scene(self.collision_times)
         radius = model.link_radius
         angles = [linear_at(self.target.times, seed.angles, self.collision_times) for seed in self.fingers]
         for t in range(len(self.collision_times)):
@@ -118,7 +119,7 @@ class Witness:
                     for i in range(len(chain))
                     for j in range(i + 2, len(chain))
                 ]
-                for capsule in primitives[t].reshape(-1, 7):
+                for capsule in rods(self.model.bodies, bodies[t]):
                     gaps = [segments_apart(*link, capsule[:3], capsule[3:6]) - radius - capsule[6] for link in chain]
                     apart += gaps[:-1]
                     total += float(g(-gaps[-1]))  # the last link may touch

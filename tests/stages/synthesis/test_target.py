@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from casadi_hands.stages.synthesis.target import string_of, target_of
 from tests.problem.test_model import rotations
-from tests.stages.example import Motion, everything, made_up_floating, project
+from tests.stages.example import Motion, everything, made_up_floating, project, rod, rods
 
 
 @pytest.mark.parametrize(
@@ -35,7 +35,7 @@ def test_contacts_and_forces_are_seen_from_the_palm() -> None:
         center = palm.inv().apply(pose[:3] - model.palm_position[sample])
         np.testing.assert_allclose(target.centers[k], center, atol=1e-12)
         for c in range(model.contacts):
-            point, outward = project(floating.point[k, c], model.capsules[c])
+            point, outward = project(floating.point[k, c], rod(model.touched[c]))
             force = turn.apply(floating.force[sample, c]) * floating.active[k, c]
             np.testing.assert_allclose(target.points[k, c], center + turn.apply(point), atol=1e-12)
             np.testing.assert_allclose(target.normals[k, c], -turn.apply(outward), atol=1e-12)
@@ -45,17 +45,17 @@ def test_contacts_and_forces_are_seen_from_the_palm() -> None:
     assert target.active.shape == (len(model.schedule.keyframes), 3)
 
 
-def test_scene_is_the_object_s_capsules_and_the_ground_s_plane_in_the_palm_frame() -> None:
+def test_scene_is_the_object_s_bodies_and_the_ground_s_plane_in_the_palm_frame() -> None:
     _, model = everything()
     assert model.ground is not None
     floating = made_up_floating(model)
     target = target_of(model, floating)
     times = model.schedule.samples[::3]
-    primitives, up, offset = target.scene(times)
+    bodies, up, offset = target.scene(times)
     positions, turns = Motion(model, floating.pose).at(0)
     for t in range(len(times)):
         palm, position = rotations(model.palm_quaternion[3 * t]), model.palm_position[3 * t]
-        for capsule, found in zip(model.primitives, primitives[t].reshape(-1, 7), strict=True):
+        for capsule, found in zip(map(rod, model.bodies), rods(model.bodies, bodies[t]), strict=True):
             for end in (slice(0, 3), slice(3, 6)):
                 in_world = turns[3 * t].apply(capsule[end]) + positions[3 * t]
                 np.testing.assert_allclose(found[end], palm.inv().apply(in_world - position), atol=1e-12)

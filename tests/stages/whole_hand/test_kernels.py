@@ -23,8 +23,10 @@ from tests.stages.example import (
     g,
     made_up_finger,
     made_up_values,
+    marks,
     palm_apart,
     project,
+    rod,
     segments_apart,
     spline_at,
     torques,
@@ -82,9 +84,8 @@ class Witness(ObjectWitness):
         """As the object's, from where the palm has moved to."""
         total = 0.0
         for s in range(len(self.schedule.samples)):
-            for capsule in self.model.primitives:
-                for share in (0, 0.5, 1):
-                    local = (1 - share) * capsule[:3] + share * capsule[3:6]
+            for capsule in map(rod, self.model.bodies):
+                for local in marks(capsule):
                     height = (self.objects[0][0][s] + self.objects[0][1][s].apply(local))[2]
                     total += float(g(0.02 + capsule[6] - palm_apart(self.in_palm(s, local), self.model.palm_radius)))
                     total += float(g(self.model.ground + capsule[6] - height))
@@ -139,7 +140,7 @@ class Witness(ObjectWitness):
                 apart += [(palm.apply(p) + position)[2] - model.ground - radius for p in joints]
                 if len(chain) == 3:
                     apart.append(segments_apart(*chain[0], *chain[2]) - 2 * radius)
-                for capsule in model.primitives:
+                for capsule in map(rod, model.bodies):
                     ends = (self.in_palm(s, capsule[:3]), self.in_palm(s, capsule[3:6]))
                     gaps = [segments_apart(*link, *ends) - radius - capsule[6] for link in chain]
                     apart += gaps[:-1]

@@ -16,7 +16,7 @@ from casadi_hands.problem.si import build_model
 from casadi_hands.stages.floating.stage import FloatingStage
 from casadi_hands.task import Task, load_task
 from tests.problem.test_model import rotations
-from tests.stages.example import Motion, PinFinger, project, spline_at
+from tests.stages.example import Motion, PinFinger, project, rod, spline_at
 from tests.stages.searched import whole_hand_of_two_joints
 
 TASK = Path(__file__).parents[3] / "problems" / "horizontal_translation.yaml"
@@ -74,7 +74,7 @@ def test_contacts_touch_both_surfaces(solved: Solved) -> None:
         tip = np.array([0, 0, 0, 0, 0, finger.lengths[-1], model.link_radius])
         for s in np.flatnonzero(result.active[:, contact]):
             point = result.point[s, contact]
-            assert np.linalg.norm(project(point, model.capsules[contact])[0] - point) * length < MILLIMETRE
+            assert np.linalg.norm(project(point, rod(model.touched[contact]))[0] - point) * length < MILLIMETRE
             chain, rotation = PinFinger(finger, model.link_radius).chain(result.angles[i][s])
             on_link = rotation.T @ (solved.in_palm(s, point) - chain[-2])
             assert np.linalg.norm(project(on_link, tip)[0] - on_link) * length < MILLIMETRE
@@ -93,7 +93,7 @@ def test_friction_on_the_object_is_kept(solved: Solved) -> None:
     model, result = solved.model, solved.result
     excess = []
     for s, contact in zip(*np.nonzero(result.active), strict=True):
-        inward = -project(result.point[s, contact], model.capsules[contact])[1]
+        inward = -project(result.point[s, contact], rod(model.touched[contact]))[1]
         pressing = result.force[s, contact] @ inward
         excess.append(np.linalg.norm(result.force[s, contact] - pressing * inward) - model.friction * pressing)
     assert max(excess) <= 1e-6
