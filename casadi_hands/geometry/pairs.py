@@ -14,7 +14,7 @@ from casadi_hands.geometry.bodies.sphere import Point
 from casadi_hands.geometry.segments import point_segment_distance, segment_distance
 from casadi_hands.geometry.smooth import clamp, norm
 
-_ROUNDS = 6  # of alternating projection
+_ROUNDS = 12  # of false position
 _ROUNDING = 1e-4  # value of the distance of bodies that cross
 
 
@@ -27,13 +27,26 @@ def _segment_and_point(one: Segment, other: Point) -> SX:
 
 
 def _segment_and_core(one: Segment, other: Core) -> SX:
-    """By alternating projection: nearest points of two convex sets, each nearest to the other's, converge to them."""
+    """The least over the segment of the distance from a convex set, which is convex: where its slope vanishes.
+
+    The root is bracketed by the segment's ends and narrowed by false position (Illinois).
+    """
     along = one.end - one.start
-    point = (one.start + one.end) / 2
+
+    def slope(share: SX) -> SX:
+        return ca.dot(other.offset(one.start + share * along), along)
+
+    low, high = SX(0), SX(1)
+    below, above = slope(low), slope(high)
+    first, last = below >= 0, above <= 0  # where the nearest point is an end
     for _ in range(_ROUNDS):
-        nearest = point - other.offset(point)
-        share = clamp(ca.dot(nearest - one.start, along) / (ca.sumsqr(along) + 1e-12), 0, 1)
-        point = one.start + share * along
+        share = (low * above - high * below) / (above - below + 1e-12)
+        here = slope(share)
+        before = here < 0
+        low, high = ca.if_else(before, share, low), ca.if_else(before, high, share)
+        below, above = ca.if_else(before, here, below / 2), ca.if_else(before, above / 2, here)
+    share = ca.if_else(first, 0, ca.if_else(last, 1, clamp(share, 0, 1)))
+    point = one.start + share * along
     return norm(other.offset(point), _ROUNDING) - other.depth(point)
 
 
