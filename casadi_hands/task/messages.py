@@ -9,10 +9,11 @@ from typing import Any
 from pydantic_core import ErrorDetails
 
 from casadi_hands.task.problem import Problem
-from casadi_hands.task.shapes import SECTIONS
+from casadi_hands.task.shapes import SECTIONS, spelled
 from casadi_hands.task.structure import description_at, names_at, paths_of
 
-_KINDS = " or ".join(f"{name}: {{{{{', '.join(section.model_fields)}}}}}" for name, section in SECTIONS.items())
+# A template, in which braces are doubled.
+_KINDS = " or ".join(f"{name}: {{{spelled(section)}}}" for name, section in SECTIONS.items())
 _ALLOWED = {
     "float_type": "a number (without quotes or unit; lengths in m, times in s, masses in kg)",
     "finite_number": "a finite number",

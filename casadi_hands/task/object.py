@@ -8,9 +8,9 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from casadi_hands.task.fields import Matrix, Positive, Section, Vector, follows, refuse, vector
-from casadi_hands.task.shapes import SECTIONS, Primitive, Shape
+from casadi_hands.task.shapes import SECTIONS, Primitive, Shape, spelled
 
-_KINDS = " and ".join(f"`{name}: {{{', '.join(each.model_fields)}}}`" for name, each in SECTIONS.items())
+_KINDS = ", ".join(f"`{name}: {spelled(each)}`" for name, each in SECTIONS.items())
 
 
 def _shares(shapes: tuple[Primitive, ...]) -> np.ndarray:

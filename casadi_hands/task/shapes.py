@@ -57,9 +57,17 @@ def _section(kind: type[Body]) -> Any:
     given: dict[str, Any] = {}
     for each in fields(kind):
         default = each.metadata.get("default")
-        more = {} if default is None else {"default_factory": default}
+        more = {}
+        if default is not None:
+            more = {"default_factory": default, "json_schema_extra": {"default": each.metadata["default_text"]}}
         given[each.name] = (_TYPES[each.metadata["is"]], Field(description=each.metadata["about"], **more))
     return create_model(kind.__name__, __base__=Primitive, __doc__=kind.__doc__, **given)
+
+
+def spelled(section: Any) -> str:
+    """The fields that a section must have, as in a file."""
+    required = [name for name, given in section.model_fields.items() if given.is_required()]
+    return f"{{{', '.join(required)}}}"
 
 
 SECTIONS: dict[str, Any] = {name: _section(kind) for name, kind in KINDS.items()}
