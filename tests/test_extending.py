@@ -7,7 +7,6 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -27,14 +26,14 @@ def section(title: str) -> str:
 
 
 @pytest.fixture
-def copy(tmp_path: Path) -> Iterator[Path]:
+def copy(tmp_path: Path) -> Path:
     """A folder with a copy of the package."""
     ignored = shutil.ignore_patterns("__pycache__", "src")
     shutil.copytree(ROOT / "casadi_hands", tmp_path / "casadi_hands", ignore=ignored)
     for built in ("_built_with.py", "_extension*.so"):
         for file in _built(built):
             shutil.copy(file, tmp_path / "casadi_hands" / "kinematics")
-    yield tmp_path
+    return tmp_path
 
 
 def _built(pattern: str) -> list[Path]:

@@ -79,7 +79,7 @@ def holdings(model: Model, floating: Floating, friction: float | None = None) ->
 
 
 def least_friction(model: Model, floating: Floating) -> float | None:
-    """The least friction with which the contacts hold the object at every keyframe, pressed within ``MOST_NORMAL_FORCE``.
+    """The least friction with which the contacts hold the object at all keyframes, within ``MOST_NORMAL_FORCE``.
 
     Found by bisection, to a hundredth of itself; None if no friction up to ``MOST_FRICTION`` would do.
     """

@@ -87,7 +87,8 @@ class Refiner:
                 judged, refined, stage = design, other, halved
         judged = self._replayed(judged)
         if judged.drops and refined.margin != LARGE:
-            text = f"again with a larger lower bound on normal forces: {judged.drops} of {REPLAYS} replays dropped the object"
+            dropped = f"{judged.drops} of {REPLAYS} replays dropped the object"
+            text = f"again with a larger lower bound on normal forces: {dropped}"
             larger = self._with_margin(whole, refined, stage, LARGE, text)
             design = self._replayed(self._judged(stage.model, larger, short, planned))
             if rank_of(design) < rank_of(judged):

@@ -105,7 +105,7 @@ def _matrix(quaternion: Array) -> Array:
 def shortened(model: Model, homotopy: float) -> Model:
     """The task for a homotopy parameter: that part of what leads from its first goal to each of the others.
 
-    No contact is planned to move. A palm that moves does so as far as ever; scaled is what the object moves seen from it.
+    No contact is planned to move. A palm moves as far as ever; scaled is what the object moves as seen from it.
     """
     seen = goals_seen_from_palm(model)
     goals = carried_by_palm(model, seen[0] + homotopy * (seen - seen[0]), model.schedule.goal_samples)

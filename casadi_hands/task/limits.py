@@ -19,7 +19,8 @@ class Limits(Section):
     goal_angle: NonNegative = Field(default=0.5, description="Angle between object and goal, degrees.")
     residual: NonNegative = Field(
         default=1e-6,
-        description="Newton-Euler residual at the motion's knots: force over weight, torque over weight × characteristic length.",
+        description="Newton-Euler residual at the motion's knots: force over weight, torque over weight × "
+        "characteristic length.",
     )
     residual_between: NonNegative = Field(default=1e-3, description="The same between knots.")
     friction_excess: NonNegative = Field(

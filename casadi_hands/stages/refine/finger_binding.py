@@ -8,11 +8,11 @@ from casadi_hands.kinematics.singularity import MARGIN_SIZES
 from casadi_hands.nlp import Parameter, Rows
 from casadi_hands.stages.object_motion.values import CLEARANCE
 from casadi_hands.stages.refine import finger_kernels as kernels
-from casadi_hands.stages.refine.declaration import FREE, IN_CONE, Declaration, Knots
+from casadi_hands.stages.refine.declaration import FREE, IN_CONE, Bounds, Declaration, Knots
 
 
 def bind_contact(of: Declaration, i: int) -> None:
-    """A finger's contact: on both surfaces, in its cone, actuated, rolling, also under the task's disturbances."""
+    """A finger's contact: on both surfaces, in its cone, actuated, also under the task's disturbances."""
     structure = of.structure
     c, n, torque = structure.contacts[i], structure.joints[i], structure.model.torque_limit
     kind = type(structure.model.touched[c])
@@ -37,6 +37,14 @@ def bind_contact(of: Declaration, i: int) -> None:
         **of.scene(c, touching),
         **of.of(c, touching, *names),
     )
+    _bind_disturbed(of, i, actuated, limited)
+
+
+def _bind_disturbed(of: Declaration, i: int, actuated: Bounds, limited: bool) -> None:
+    """The same contact's force where a disturbance acts."""
+    structure = of.structure
+    c, n = structure.contacts[i], structure.joints[i]
+    kind, point = type(structure.model.touched[c]), of.point.entries(3 * i, 3 * i + 3, c)
     disturbed = np.flatnonzero(structure.active[of.disturbed, i])
     if len(disturbed):
         knots = of.disturbed[disturbed]
@@ -55,6 +63,14 @@ def bind_contact(of: Declaration, i: int) -> None:
             **of.scene(c, knots),
             **of.of(c, knots, "frames"),
         )
+
+
+def bind_rolling(of: Declaration, i: int) -> None:
+    """A finger's contact from knot to knot: it rolls, and its force is actuated halfway, too."""
+    structure = of.structure
+    c, n = structure.contacts[i], structure.joints[i]
+    kind = type(structure.model.touched[c])
+    point, force = (rows.entries(3 * i, 3 * i + 3, c) for rows in (of.point, of.force))
     start = np.flatnonzero(structure.active[:-1, i])
     scenes = of.scene(c, start), of.scene(c, start + 1)
     of.bind(

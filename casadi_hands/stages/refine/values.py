@@ -86,7 +86,7 @@ class RefineValues:
         return always, exact
 
     def singularity_margins(self, motion: WholeHand) -> tuple[dict[str, ArrayLike], Bounds]:
-        """Parameters and bounds that keep each finger on its side of singular poses, where it is nearly all of the time."""
+        """Parameters and bounds that keep fingers on their sides of singular poses, where they nearly always are."""
         structure = self.structure
         parameters: dict[str, ArrayLike] = {}
         bounds: Bounds = {}
