@@ -105,6 +105,20 @@ def cone_margin(force: SX, inward_normal: SX, friction: SX) -> SX:
     return friction * pressing - norm(force - pressing * inward_normal, 1e-3)
 
 
+def cone_margin_squared(pressing: SX, across: SX, friction: SX) -> SX:
+    """(μ f_n)² - f_t² in (m·g)²; negative outside the cone, for normal forces that are bounded below.
+
+    Exact and without a square root, whose rounding (see ``cone_margin``) an exact motion would rest on; the soft stages,
+    where normal forces may turn negative, need the other form, which tells the two cones apart.
+
+    Args:
+        pressing: normal force f_n, m·g.
+        across: square of the tangential force f_t, (m·g)².
+        friction: μ.
+    """
+    return (friction * pressing) ** 2 - across
+
+
 def off_surface(force: SX, invariant: SX, point: SX, projection: SX) -> SX:
     """‖f‖ c ‖proj(r) - r‖² (eq. 2.10 and its form for fingers); a plain value."""
     return norm(force, 1e-3) * invariant * ca.sumsqr(projection - point)

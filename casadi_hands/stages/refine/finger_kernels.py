@@ -168,7 +168,8 @@ def _hold(
     pressing = -ca.dot(force, touch.normal)
     across = ca.sumsqr(force + pressing * touch.normal)
     kernel.constrain(limits.DISTURBED_PRESSING if disturbed else limits.PRESSING, pressing)
-    kernel.constrain(limits.DISTURBED_CONE if disturbed else limits.CONE, (friction * pressing) ** 2 - across)
+    cone = contact_terms.cone_margin_squared(pressing, across, friction)
+    kernel.constrain(limits.DISTURBED_CONE if disturbed else limits.CONE, cone)
     structural = _structural(touch, force)
     kernel.constrain(limits.DISTURBED_ACTUATED if disturbed else limits.ACTUATED, structural)
     if limited:

@@ -230,7 +230,7 @@ def disturbed_ground() -> Kernel:
 def _hold(kernel: Kernel, exerted: SX, friction: SX, declared: tuple[Constraint, Constraint]) -> None:
     """Constrain the ground's force (3,) on the object, world: ``pressing`` (1) and ``cone`` (1: (μ f_n)² - f_t²)."""
     kernel.constrain(declared[0], exerted[2])
-    kernel.constrain(declared[1], (friction * exerted[2]) ** 2 - ca.sumsqr(exerted[:2]))
+    kernel.constrain(declared[1], contact.cone_margin_squared(exerted[2], ca.sumsqr(exerted[:2]), friction))
 
 
 @cache
