@@ -108,7 +108,7 @@ def cone_margin(force: SX, inward_normal: SX, friction: SX) -> SX:
 def cone_margin_squared(pressing: SX, across: SX, friction: SX) -> SX:
     """(μ f_n)² - f_t² in (m·g)²; negative outside the cone, for normal forces that are bounded below.
 
-    Exact and without a square root, whose rounding (see ``cone_margin``) an exact motion would rest on; the soft stages,
+    Without a square root, whose rounding (see ``cone_margin``) an exact motion would rest on; the soft stages,
     where normal forces may turn negative, need the other form, which tells the two cones apart.
 
     Args:
