@@ -114,7 +114,7 @@ def test_a_motion_is_made_exact_on_ever_denser_knots(start: WholeHand) -> None:
     assert refined.exact
     assert [run.what for run in refined.runs] == [
         *(f"sparse {step[0]}" for step in ALL_STEPS),
-        "coarse exact",
+        "coarse hard constraints",
         "hard constraints",
     ]
     assert len(refined.hand.position) == len(MODEL.schedule.samples)
@@ -220,7 +220,8 @@ def test_near_motions_take_the_short_way_and_the_long_one_where_it_fails(start: 
     denser = [("coarse", "hard constraints"), ("fine", "hard constraints"), ("fine", SHORT)]
     assert told.ways == [("sparse", SHORT), *denser, ("sparse", LONG), *denser]
     assert not refined.exact
-    assert len(refined.runs) == sum(len(way.split()) for _, way in told.ways)
+    steps = {LONG: len(ALL_STEPS), SHORT: len(NEARBY_STEPS), "hard constraints": 1}
+    assert len(refined.runs) == sum(steps[way] for _, way in told.ways)
 
 
 def test_a_motion_is_lengthened_until_it_reaches_its_goals(start: WholeHand) -> None:
@@ -238,7 +239,7 @@ def test_a_motion_is_lengthened_until_it_reaches_its_goals(start: WholeHand) -> 
     np.testing.assert_allclose(begun, 1 / 6)
     assert refined.exact
     assert refined.homotopy == 1
-    assert refined.runs[0][0] == "sparse 50% of the way, soft"
+    assert refined.runs[0][0] == "sparse homotopy 50%, penalty"
 
 
 def test_steps_get_shorter_where_they_fail_and_the_longest_exact_motion_is_kept(start: WholeHand) -> None:
@@ -293,23 +294,29 @@ def test_a_firmer_grip_is_kept_where_it_is_exact_and_the_other_one_elsewhere(sta
     assert refined.exact
     assert refined.margin == (Margin() if fails_on else firm)
     steps = {
-        "": ["sparse firm", "sparse exact", "coarse exact", "hard constraints"],
-        "sparse": ["sparse firm", "sparse exact"],
-        "coarse": ["sparse firm", "sparse exact", "coarse exact", "coarse stiff penalty", "coarse exact"],
+        "": ["sparse stiff penalty", "sparse hard constraints", "coarse hard constraints", "hard constraints"],
+        "sparse": ["sparse stiff penalty", "sparse hard constraints"],
+        "coarse": [
+            "sparse stiff penalty",
+            "sparse hard constraints",
+            "coarse hard constraints",
+            "coarse stiff penalty",
+            "coarse hard constraints",
+        ],
         "fine": [
-            "sparse firm",
-            "sparse exact",
-            "coarse exact",
+            "sparse stiff penalty",
+            "sparse hard constraints",
+            "coarse hard constraints",
             "hard constraints",
             "stiff penalty",
             "hard constraints",
         ],
     }[fails_on]
-    assert [run.what for run in refined.runs if run.margin == firm] == [f"firmer grip, {step}" for step in steps]
+    assert [run.what for run in refined.runs if run.margin == firm] == [f"larger grip, {step}" for step in steps]
     if fails_on:
-        assert [run.what for run in refined.runs[-2:]] == ["coarse exact", "hard constraints"]
+        assert [run.what for run in refined.runs[-2:]] == ["coarse hard constraints", "hard constraints"]
     # The whole way with the first margin was gone once.
-    assert [run.what for run in refined.runs].count("sparse 50% of the way, soft") == 1
+    assert [run.what for run in refined.runs].count("sparse homotopy 50%, penalty") == 1
 
 
 def test_a_short_rest_of_the_way_is_gone_in_one_step(start: WholeHand) -> None:
@@ -319,9 +326,7 @@ def test_a_short_rest_of_the_way_is_gone_in_one_step(start: WholeHand) -> None:
     assert refined.exact
 
 
-@pytest.mark.parametrize(
-    ("answers", "hard constraints"), [([True], True), ([False, True], True), ([False, False], False)]
-)
+@pytest.mark.parametrize(("answers", "exact"), [([True], True), ([False, True], True), ([False, False], False)])
 def test_a_motion_that_is_exact_but_for_its_samples_takes_the_last_step_alone(
     start: WholeHand, answers: list[bool], exact: bool
 ) -> None:
