@@ -12,10 +12,11 @@ import scipy.sparse as sparse
 from casadi import MX, Function
 from numpy.typing import ArrayLike, NDArray
 
+from casadi_hands.declared import Constraint, Term
 from casadi_hands.nlp.arguments import Argument, arguments_by_name, check_arguments
 from casadi_hands.nlp.assembly import Gathering, Reads, scatter_hessian, scatter_jacobian, together
 from casadi_hands.nlp.derivatives import KernelFunctions, kernel_functions, portable_functions
-from casadi_hands.nlp.kernel import Constraint, Kernel, Term
+from casadi_hands.nlp.kernel import Kernel
 from casadi_hands.nlp.layout import Label, Layout, Parameter, Rows
 
 Vector = NDArray[np.float64]

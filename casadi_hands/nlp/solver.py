@@ -15,8 +15,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from casadi_hands.declared import Term
 from casadi_hands.nlp.failure import SolverError
-from casadi_hands.nlp.kernel import Term
 from casadi_hands.nlp.problem import Problem
 from casadi_hands.nlp.program import Program
 from casadi_hands.nlp.watch import Watch

@@ -7,8 +7,8 @@ from dataclasses import replace
 import casadi as ca
 from casadi import SX
 
+from casadi_hands.declared import Term, Weight
 from casadi_hands.motion import angle_squared
-from casadi_hands.nlp import Term, Weight
 
 LINEAR_MOMENTUM = Term("linear_momentum", "Newton's law", "eq. 2.6", "m·g", weights={"floating": Weight(10.0)})
 ANGULAR_MOMENTUM = Term("angular_momentum", "Euler's law", "eq. 2.5", "m·g·length", weights={"floating": Weight(10.0)})

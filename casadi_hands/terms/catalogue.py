@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from casadi_hands.nlp import Term
+from casadi_hands.declared import Term
 from casadi_hands.terms import body, clearance, contact, finger
 
 STAGES = ("floating", "synthesis", "whole_hand", "refine")

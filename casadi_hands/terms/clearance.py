@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import casadi as ca
 from casadi import SX
 
+from casadi_hands.declared import Term, Weight
 from casadi_hands.geometry import penalty_spline, point_disc_distance, segment_distance
 from casadi_hands.geometry.bodies import Surface
 from casadi_hands.geometry.bodies.capsule import Segment
 from casadi_hands.geometry.pairs import core_distance
-from casadi_hands.nlp import Term, Weight
 
 _ROUNDING = 1e-3  # half the width of the spline's transition, lengths
 

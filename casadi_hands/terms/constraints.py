@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from casadi_hands.nlp import Constraint
+from casadi_hands.declared import Constraint
 
 _JOINTS = "more joints (search.max_joints)"
 _REACH = f"{_JOINTS} or a contact on the palm's side of the object"

@@ -7,8 +7,8 @@ from dataclasses import replace
 import casadi as ca
 from casadi import SX
 
+from casadi_hands.declared import Term, Weight
 from casadi_hands.geometry import norm, soft_exponential
-from casadi_hands.nlp import Term, Weight
 
 FORCE_REGULARISATION = Term(
     "force_regularisation", "Forces that act", "eq. 2.7", "m·g", weights={"floating": Weight(0.01)}

@@ -7,8 +7,8 @@ from dataclasses import replace
 import casadi as ca
 from casadi import SX
 
+from casadi_hands.declared import Term, Weight
 from casadi_hands.geometry import norm, penalty_spline
-from casadi_hands.nlp import Term, Weight
 
 # Of the Jacobian's singular values, lengths per rad: the lever below which a joint does not push.
 NULL_SPACE_DAMPING = 0.02

@@ -11,8 +11,8 @@ import numpy as np
 from casadi import SX
 from numpy.typing import ArrayLike
 
+from casadi_hands.declared import Constraint, Term, Weight
 from casadi_hands.errors import SolveError
-from casadi_hands.nlp import Constraint, Term, Weight
 from casadi_hands.terms.catalogue import names
 
 OWN_STAGES = ("floating", "whole_hand", "refine")  # with the object's pose, its contacts and forces as variables
