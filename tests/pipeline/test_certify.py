@@ -181,9 +181,9 @@ def test_what_a_firmer_grip_changes_is_told_from_the_hand_before_any_refinement(
     assert changes == [None, {"from": whole, "to": firm}, None]
     # Each solve is told with the margin that it kept, whatever was asked for at first.
     assert [run["what"].split("friction and ")[1] for run in record.design.stages] == [
-        "1 weights of grip",
-        "4 weights of grip",
-        "1 weights of grip",
+        "1 weights of normal force",
+        "4 weights of normal force",
+        "1 weights of normal force",
     ]
 
 
@@ -259,9 +259,9 @@ class Ways:
     def solve(self, start: Any, margin: Margin, near: bool) -> Any:
         return self.taken("solve", margin)
 
-    def continue_from(self, start: Any, homotopy: float, margin: Margin, firmer: Margin) -> Any:
-        assert (homotopy, margin, firmer) == (0.5, AMPLE, LARGE)
-        return self.taken("continue_from", firmer if self.firm else margin)
+    def continue_from(self, start: Any, homotopy: float, margin: Margin, larger: Margin) -> Any:
+        assert (homotopy, margin, larger) == (0.5, AMPLE, LARGE)
+        return self.taken("continue_from", larger if self.firm else margin)
 
     def with_margin(self, exact: Any, margin: Margin) -> Any:
         return self.taken("with_margin", margin)
@@ -380,15 +380,15 @@ fingers: {left: {touches: [0.03, 0, 0]}, right: {touches: [-0.03, 0, 0]}}
 
 @pytest.mark.parametrize("limits_travel", [True, False])
 def test_only_where_contacts_are_held_back_refinements_begin_with_a_part_of_the_way(
-    monkeypatch: pytest.MonkeyPatch, limited_travel: bool
+    monkeypatch: pytest.MonkeyPatch, limits_travel: bool
 ) -> None:
     model, given = build_model(parse_task(SPHERE)), SimpleNamespace(name="the whole way")
     asked: list[Any] = []
-    monkeypatch.setattr(type(model), "limits_travel", limited_travel)
+    monkeypatch.setattr(type(model), "limits_travel", limits_travel)
     monkeypatch.setattr(certify, "run_shortened", lambda record, part, whole: asked.append((part, whole)) or "a part")
     anything: Any = None
     begun = Certifier(anything, model, given, anything, anything, 1)._begun  # type: ignore[arg-type]
-    if not limited_travel:
+    if not limits_travel:
         assert begun == (model, given, 1.0)
         assert asked == []
         return

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from casadi_hands.export.design import Design
+from casadi_hands.nlp import Term
 from casadi_hands.pipeline.record import Progress, Record
 from tests.pipeline.replayed import replayed
 from tests.stages.example import made_up_solution
@@ -55,13 +56,16 @@ def test_an_earlier_design_gets_the_runs_and_times_of_what_was_tried_after_it(cl
 
 def test_costs_have_the_last_of_annealed_weights_and_those_of_perturbed_twins() -> None:
     kept = record([])
-    solution = made_up_solution({}, physics=2.0, physics_perturbed=3.0, collision=4.0, unknown=5.0)
+    declared = {name: Term(name) for name in ("physics", "collision")}
+    declared |= {"physics_perturbed": Term("physics"), "on_ground": Term("on_ground", weighs_as="physics")}
+    solution = made_up_solution({}, physics=2.0, physics_perturbed=3.0, collision=4.0, on_ground=5.0)
+    solution = replace(solution, declared=declared)
     kept.set_costs("synthesis", solution, {"physics": 10.0, "collision": (0.1, 5.0, 100.0)})
     assert kept.design.costs["synthesis"] == {
         "physics": {"weight": 10.0, "value": 2.0},
         "physics_perturbed": {"weight": 10.0, "value": 3.0},
         "collision": {"weight": 100.0, "value": 4.0},
-        "unknown": {"weight": 0.0, "value": 5.0},
+        "on_ground": {"weight": 10.0, "value": 5.0},
     }
 
 

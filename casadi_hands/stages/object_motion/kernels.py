@@ -17,6 +17,8 @@ from casadi_hands.terms import body as motion_terms
 from casadi_hands.terms import clearance, contact
 from casadi_hands.terms import constraints as limits
 
+_MARKS = 3  # points that stand for a capsule, of which the weight is
+
 
 @cache
 def dynamics(contacts: int, suffix: str = "", regularise: bool = True) -> Kernel:
@@ -176,11 +178,13 @@ def palm_clearance(kind: type[Body], moves: bool) -> Kernel:
     rotation = rotation_matrix(quaternion)
     core = body.core.mapped(lambda point: position + ca.mtimes(rotation, point))
     costs: list[SX] = []
-    for point in core.marks(palm.axis):
+    marks = core.marks(palm.axis)
+    for point in marks:
         distance = point_disc_distance(palm.sees(point), palm_radius) - body.radius
         costs.append(clearance.overlap(margin - distance))
         costs.append(clearance.overlap(ground - (point[2] - body.radius)))
-    kernel.cost(clearance.PALM_CLEARANCE, ca.vertcat(*costs))
+    # A body costs the same however many points stand for it.
+    kernel.cost(clearance.PALM_CLEARANCE, _MARKS / len(marks) * ca.vertcat(*costs))
     return kernel
 
 

@@ -138,7 +138,7 @@ class Witness:
         return float(total)
 
     def palm_clearance(self) -> float:
-        """Ends and middle of each body's axis against palm (0.02 lengths apart) and ground."""
+        """Ends and middle of each body's axis against palm (0.02 lengths apart) and ground; a ball's centre thrice."""
         model, total = self.model, 0.0
         positions, orientations = self.motion.at(0)
         for s, (position, turn) in enumerate(zip(positions, orientations, strict=True)):
@@ -147,9 +147,10 @@ class Witness:
                 for mark in marks(capsule):
                     point = position + turn.apply(mark)
                     seen = palm.inv().apply(point - model.palm_position[s])
-                    total += float(g(0.02 + capsule[6] - palm_apart(seen, model.palm_radius)))
+                    times = 3 / len(marks(capsule))
+                    total += times * float(g(0.02 + capsule[6] - palm_apart(seen, model.palm_radius)))
                     if model.ground is not None:
-                        total += float(g(model.ground + capsule[6] - point[2]))
+                        total += times * float(g(model.ground + capsule[6] - point[2]))
         return total
 
     def force_terms(self, suffix: str) -> dict[str, float]:
