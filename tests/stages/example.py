@@ -183,9 +183,8 @@ def rod(body: Body) -> Array:
 
 
 def marks(capsule: Array) -> Array:
-    """Ends and middle of an axis (3, 3), or its one point (1, 3) where it has no length."""
-    points = np.array([capsule[:3], (capsule[:3] + capsule[3:6]) / 2, capsule[3:6]])
-    return points if np.any(capsule[:3] != capsule[3:6]) else points[:1]
+    """Ends and middle of an axis (3, 3); of a sphere its centre, which counts as much as they do."""
+    return np.array([capsule[:3], (capsule[:3] + capsule[3:6]) / 2, capsule[3:6]])
 
 
 def rods(bodies: Sequence[Body], parameters: Array) -> list[Array]:
