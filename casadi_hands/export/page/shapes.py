@@ -79,12 +79,19 @@ def patched_sphere(radius: float, tones: tuple[Color, Color]) -> PatchedMesh:
 
 
 def patched_cylinder(radius: float, length: float, tones: tuple[Color, Color]) -> PatchedMesh:
-    """An open cylinder about the z axis, centred; its colours continue those of spheres at its ends."""
+    """A cylinder about the z axis, centred; its colours continue those of spheres at its ends."""
     patches, colors = [], []
     for k, (quarter, half) in enumerate(_octants()):
         azimuth, height = _grid(quarter, (0.0, length / 2) if half == 0 else (-length / 2, 0.0))
         normals = np.array([np.cos(azimuth), np.sin(azimuth), np.zeros_like(azimuth)])
         patches.append((radius * normals + np.array([0.0, 0.0, 1.0])[:, None, None] * height, normals))
+        colors.append(tones[(k + half) % 2])
+        # A quarter of the face, inwards or outwards so that it is seen from outside.
+        way = (radius, 0.0) if half == 0 else (0.0, radius)
+        azimuth, far = _grid(quarter, (radius, 0.0) if half == 0 else (0.0, radius))
+        sign = 1.0 if half == 0 else -1.0
+        face = np.array([far * np.cos(azimuth), far * np.sin(azimuth), np.full_like(far, sign * length / 2)])
+        patches.append((face, np.stack([0 * far, 0 * far, np.full_like(far, sign)])))
         colors.append(tones[(k + half) % 2])
     return PatchedMesh(patches, colors)
 
