@@ -147,10 +147,9 @@ class Witness:
                 for mark in marks(capsule):
                     point = position + turn.apply(mark)
                     seen = palm.inv().apply(point - model.palm_position[s])
-                    times = 3 / len(marks(capsule))
-                    total += times * float(g(0.02 + capsule[6] - palm_apart(seen, model.palm_radius)))
+                    total += float(g(0.02 + capsule[6] - palm_apart(seen, model.palm_radius)))
                     if model.ground is not None:
-                        total += times * float(g(model.ground + capsule[6] - point[2]))
+                        total += float(g(model.ground + capsule[6] - point[2]))
         return total
 
     def force_terms(self, suffix: str) -> dict[str, float]:

@@ -316,7 +316,7 @@ def test_the_result_is_exact_and_the_audit_certifies_it(solved: Solved) -> None:
     assert solved.verdict.reasons == []
     assert solved.verdict.certified
     names = [run.what for run in solved.refined.runs]
-    assert (names[0], names[-1]) == ("sparse soft", "hard constraints")
+    assert (names[0], names[-1]) == ("sparse penalty", "hard constraints")
 
 
 def test_the_files_have_the_points_and_forces_that_balance(solved: Solved) -> None:
@@ -392,7 +392,7 @@ def test_one_joint_cannot_roll_with_the_object_and_no_exact_solve_is_tried(solve
         steps = np.linalg.norm(last[f"rolling{contact}.no_slip"], axis=1)
         assert refined.slips[name] == pytest.approx(steps.sum(), rel=1e-12)
     names = [run.what for run in refined.runs]
-    assert names[0] == "sparse soft"
+    assert names[0] == "sparse penalty"
     assert not any("hard constraints" in name for name in names)
     assert len(refined.hand.position) == len(model.schedule.samples)
     assert refined.weights == {f"sparse {what}": weights for what, weights, _ in ALL_STEPS}[names[-1]]
@@ -462,5 +462,5 @@ def test_where_the_short_way_leads_nowhere_the_long_one_is_taken(
     )
     assert again.exact
     names = [run.what for run in again.runs]
-    assert (names[0], names[-1]) == ("sparse firm", "hard constraints")
-    assert "sparse soft" in names
+    assert (names[0], names[-1]) == ("sparse stiff penalty", "hard constraints")
+    assert "sparse penalty" in names
