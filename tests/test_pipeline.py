@@ -31,7 +31,7 @@ CAPSULE = PROBLEMS / "horizontal_translation.yaml"
 ALWAYS = {"result.json", "task.yaml", "motion.npz", "motion.csv", "object.urdf"}
 OF_A_HAND = {"hand.urdf", "scene.xml", "viewer.html"}
 # Two fingers carry a ball 1.5 cm to the side, above a palm that looks up.
-BALL = f"name: ball{example.BALL}search: {{trials: 3, recombinations: 2, max_joints: 2}}\n"
+BALL = f"name: ball{example.BALL}search: {{trials: 3, recombinations: 2, max_joints: 3}}\n"
 RADIUS = 0.13 * 0.06  # of its fingers' links, m
 FOOT = 1.05 * RADIUS  # of the first joints above the palm's face, m
 LIMITS_IN_METRES = ("goal_position", "gap", "gap_between", "slip", "penetration")

@@ -36,16 +36,20 @@ def _segment_and_core(one: Segment, other: Core) -> SX:
     def slope(share: SX) -> SX:
         return ca.dot(other.offset(one.start + share * along), along)
 
+    def within(low: SX, high: SX, below: SX, above: SX) -> SX:
+        # Clamped, since the slopes at both ends of the bracket may vanish.
+        return low + (high - low) * clamp(-below / (above - below + 1e-12), 0, 1)
+
     low, high = SX(0), SX(1)
     below, above = slope(low), slope(high)
     first, last = below >= 0, above <= 0  # where the nearest point is an end
     for _ in range(_ROUNDS):
-        share = (low * above - high * below) / (above - below + 1e-12)
+        share = within(low, high, below, above)
         here = slope(share)
         before = here < 0
         low, high = ca.if_else(before, share, low), ca.if_else(before, high, share)
         below, above = ca.if_else(before, here, below / 2), ca.if_else(before, above / 2, here)
-    share = ca.if_else(first, 0, ca.if_else(last, 1, clamp(share, 0, 1)))
+    share = ca.if_else(first, 0, ca.if_else(last, 1, within(low, high, below, above)))
     point = one.start + share * along
     return norm(other.offset(point), _ROUNDING) - other.depth(point)
 

@@ -16,9 +16,6 @@ from tests.geometry.bodies.checks import along_z, coal_distance
 
 Array = NDArray[np.float64]
 THIN = 1e-6
-LEAVES_ITS_BRACKET = pytest.mark.xfail(
-    strict=True, reason="false position leaves its bracket once both slopes are of the size of its 1e-12"
-)
 
 
 def segment_to_segment(way: str) -> ca.Function:
@@ -56,7 +53,6 @@ def test_what_serves_any_core_finds_the_closed_form(rng: np.random.Generator) ->
     assert max(off) < 0.1
 
 
-@LEAVES_ITS_BRACKET
 def test_what_serves_any_core_is_exact_beside_a_point(rng: np.random.Generator) -> None:
     for start, end, point in rng.normal(size=(50, 3, 3)):
         segment = Segment(ca.SX(start), ca.SX(end))
@@ -83,7 +79,7 @@ def test_a_point_is_a_segment_of_no_length(rng: np.random.Generator) -> None:
         assert as_point == pytest.approx(float(ca.evalf(pairs.core_distance(one, Segment(at, at)))), abs=1e-6)
 
 
-@pytest.mark.parametrize("way", ["closed", pytest.param("any", marks=LEAVES_ITS_BRACKET)])
+@pytest.mark.parametrize("way", ["closed", "any"])
 def test_derivatives_are_those_of_differences(way: str) -> None:
     # Skew, both nearest points inside, where no clamp is at its corner.
     x = ca.SX.sym("x", 12)

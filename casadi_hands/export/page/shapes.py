@@ -87,7 +87,6 @@ def patched_cylinder(radius: float, length: float, tones: tuple[Color, Color]) -
         patches.append((radius * normals + np.array([0.0, 0.0, 1.0])[:, None, None] * height, normals))
         colors.append(tones[(k + half) % 2])
         # A quarter of the face, inwards or outwards so that it is seen from outside.
-        way = (radius, 0.0) if half == 0 else (0.0, radius)
         azimuth, far = _grid(quarter, (radius, 0.0) if half == 0 else (0.0, radius))
         sign = 1.0 if half == 0 else -1.0
         face = np.array([far * np.cos(azimuth), far * np.sin(azimuth), np.full_like(far, sign * length / 2)])
