@@ -31,7 +31,7 @@ CAPSULE = PROBLEMS / "horizontal_translation.yaml"
 ALWAYS = {"result.json", "task.yaml", "motion.npz", "motion.csv", "object.urdf"}
 OF_A_HAND = {"hand.urdf", "scene.xml", "viewer.html"}
 # Two fingers carry a ball 1.5 cm to the side, above a palm that looks up.
-BALL = f"name: ball{example.BALL}search: {{trials: 3, recombinations: 2, max_joints: 3}}\n"
+BALL = f"name: ball{example.BALL}search: {{trials: 3, recombinations: 2, max_joints: 2}}\n"
 RADIUS = 0.13 * 0.06  # of its fingers' links, m
 FOOT = 1.05 * RADIUS  # of the first joints above the palm's face, m
 LIMITS_IN_METRES = ("goal_position", "gap", "gap_between", "slip", "penetration")
@@ -70,7 +70,8 @@ def test_an_unknown_stage_is_refused() -> None:
 @pytest.fixture(scope="module")
 def carried(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("carried")
-    solve(parse_task(BALL), jobs=1, out=folder)
+    # Two fingers of two joints each hold the ball no better than the replay's limits; of three they do.
+    solve(parse_task(BALL.replace("max_joints: 2", "max_joints: 3")), jobs=1, out=folder)
     return folder
 
 
