@@ -13,8 +13,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from casadi_hands import Design
 from casadi_hands.errors import DesignError
+from casadi_hands.export.design import Design
 from casadi_hands.task import Task, task_to_yaml
 
 ENDED = "ended.json"
@@ -89,7 +89,7 @@ def _work(task: Task, folder: Path, until: str, jobs: int | None) -> None:
         os.dup2(log.fileno(), stream)
     sys.stdout = sys.stderr = log
     # Here, so that the parent, which does not solve, need not load the solver.
-    from casadi_hands import solve
+    from casadi_hands.pipeline import solve
 
     solve(
         task,

@@ -28,14 +28,13 @@ from profiled import KINDS, cores_used, profiled_solve
 from shared import NOTHING, options_of, write_table
 from tables import add_json, write_record
 
-from casadi_hands import load_task
 from casadi_hands.kinematics.morphology import FingerSeed
 from casadi_hands.problem.si import build_model
 from casadi_hands.stages.floating.stage import FloatingStage, solve_floating
 from casadi_hands.stages.synthesis.seeds import random_finger
 from casadi_hands.stages.synthesis.stage import SynthesisStage
 from casadi_hands.stages.synthesis.target import Target, target_of
-from casadi_hands.task import Task
+from casadi_hands.task import Task, load_task
 
 OURS = "IPOPT, exact Hessian (ours)"
 METHODS: dict[str, Method] = {

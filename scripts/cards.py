@@ -14,7 +14,7 @@ from entries import STATES, Entry
 from shared import NOTHING
 from stills import kept_stills, stills
 
-from casadi_hands import Design
+from casadi_hands.export.design import Design
 
 TEMPLATE = Path(__file__).with_name("gallery.html")
 _previews: dict[Path, bytes] = {}  # what tasks without a design look like, by file

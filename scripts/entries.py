@@ -10,9 +10,9 @@ from typing import Any
 from apart import ended, read_apart
 from shared import NOTHING, is_of, joints_of, replays_of, result_folder, with_seed
 
-from casadi_hands import Design, load_task
 from casadi_hands.errors import DesignError, HandsError, TaskError
-from casadi_hands.task import Task
+from casadi_hands.export.design import Design
+from casadi_hands.task import Task, load_task
 
 STATES = ("certified", "feasible", "failed", "stopped", "crashed", "not solved")
 """How a task may stand: the statuses of a design, and why there is none."""

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from peers import Posed, recorded_solves
 from profiled import CALLED
 
-from casadi_hands import load_task, solve
 from casadi_hands.nlp import Problem, Solver, derivatives, machine_code
 from casadi_hands.nlp.derivatives import KernelFunctions, kernel_functions
+from casadi_hands.pipeline import solve
+from casadi_hands.task import load_task
 
 Vector = NDArray[np.float64]
 FUNCTIONS = {"value": "nlp", "gradient": "grad_f", "Jacobian": "jac_g", "Hessian": "hess_lag"}

@@ -15,9 +15,9 @@ from typing import Any
 from shared import NOTHING, joints_of, kept_solve, options_of, replays_of, write_table
 from tables import add_json, write_record
 
-from casadi_hands import Design, audit
 from casadi_hands.errors import DesignError
-from casadi_hands.verify import Figure
+from casadi_hands.export.design import Design
+from casadi_hands.verify import Figure, audit
 
 HEAD = (
     "task",

@@ -22,7 +22,7 @@ from scipy.spatial.transform import Rotation
 from shared import options_of, table_text
 from tables import add_json, write_record
 
-from casadi_hands import Design
+from casadi_hands.export.design import Design
 from casadi_hands.verify import Replays, run_replays
 
 PLAYER = Path(__file__).parents[1] / "examples" / "play.py"

@@ -12,7 +12,7 @@ import yourdfpy
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
-from casadi_hands import Design
+from casadi_hands.export.design import Design
 
 Facts = dict[str, np.ndarray]
 

@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-from casadi_hands import load_task, solve
 from casadi_hands.nlp import Options, Solution, Solver
-from casadi_hands.pipeline import Progress, judge
+from casadi_hands.pipeline import Progress, judge, solve
 from casadi_hands.stages.floating.stage import FloatingStage
 from casadi_hands.stages.refine.stage import RefineStage
 from casadi_hands.stages.synthesis.stage import SynthesisStage
 from casadi_hands.stages.whole_hand.stage import WholeHandStage
+from casadi_hands.task import load_task
 from casadi_hands.verify import audit_files, run_replays
 
 KINDS = ("building", "value", "gradient", "Jacobian", "Hessian", "rest of IPOPT", "replays", "audits")

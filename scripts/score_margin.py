@@ -13,14 +13,13 @@ from pathlib import Path
 
 from shared import SEEDS, options_of, write_table
 
-from casadi_hands import load_task
 from casadi_hands.execution.processes import processes
 from casadi_hands.problem.si import build_model
 from casadi_hands.stages.floating.stage import FloatingStage
 from casadi_hands.stages.synthesis.algorithm import Candidate, Search
 from casadi_hands.stages.synthesis.score import THRESHOLD
 from casadi_hands.stages.synthesis.target import Target, target_of
-from casadi_hands.task import Task
+from casadi_hands.task import Task, load_task
 
 PROBLEMS = Path(__file__).parents[1] / "problems"
 TASKS = ("horizontal_translation_no_gravity.yaml", "horizontal_translation.yaml")

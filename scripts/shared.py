@@ -12,9 +12,9 @@ from typing import Any
 
 from apart import ended, read_apart, solve_apart
 
-from casadi_hands import Design, load_task, replay
-from casadi_hands.task import Task, task_to_yaml
-from casadi_hands.verify import replay_many
+from casadi_hands.export.design import Design
+from casadi_hands.task import Task, load_task, task_to_yaml
+from casadi_hands.verify import replay, replay_many
 
 SEEDS = (0, 1, 2, 3, 4)
 NOTHING = "–"

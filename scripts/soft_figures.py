@@ -15,8 +15,8 @@ from apart import ended
 from shared import NOTHING, SEEDS, joints_of, kept_solve, options_of, write_table
 from tables import add_json, write_record
 
-from casadi_hands import Design
 from casadi_hands.errors import DesignError
+from casadi_hands.export.design import Design
 from casadi_hands.verify.figures.clearance import penetration_figure
 from casadi_hands.verify.figures.contact import Placements, active_contacts, surface_normals
 from casadi_hands.verify.figures.dynamics import sample_residual, shoot

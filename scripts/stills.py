@@ -10,7 +10,7 @@ from camera import Camera, look, png
 from raycast import Capsule, Disc, draw, overlay
 from scipy.spatial.transform import Rotation
 
-from casadi_hands import Design
+from casadi_hands.export.design import Design
 from casadi_hands.export.markup import OBJECT_COLOR, PALM_COLOR, Color, finger_color, joint_color
 from casadi_hands.export.page.robot import Robot
 from casadi_hands.export.page.scene import EXTERNAL_COLOR, FORCE_COLOR, GOAL_COLOR, eye_towards

@@ -19,7 +19,8 @@ from shared import joints_of, kept_solve, options_of, table_text
 from tables import add_json, write_record
 from vary import Change, write_variation
 
-from casadi_hands import Design, load_task
+from casadi_hands.export.design import Design
+from casadi_hands.task import load_task
 
 RATES = ("task", "solved", *STATES[:-1], "rate certified")
 RUNS = (

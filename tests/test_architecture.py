@@ -22,7 +22,7 @@ FLOORS = (
     {"stages", "verify"},
     {"export", "diagnosis"},
     {"pipeline"},
-    {"__init__", "cli"},
+    {"__init__", "cli"},  # and scripts
 )
 LONGEST = 300  # lines of a module
 
@@ -84,7 +84,7 @@ def test_rooms_import_only_from_lower_floors() -> None:
         f"{module} imports {other}"
         for module, taken in imports().items()
         for other in taken
-        if room(module) != room(other) and floor[room(other)] >= floor[room(module)] and other != "__init__"
+        if room(module) != room(other) and floor[room(other)] >= floor[room(module)]
     ]
     assert upward == []
     assert len(FLOORS) <= 8

@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import os
 from contextlib import ExitStack
+from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
 
-from casadi_hands import __version__
 from casadi_hands.cli.options import Folder, Jobs, Seed, Stage, TaskFile
 
 app = typer.Typer(
@@ -28,7 +28,7 @@ app = typer.Typer(
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        print(f"casadi-hands {__version__}")
+        print(f"casadi-hands {version('casadi-hands')}")
         raise typer.Exit
 
 
@@ -108,7 +108,7 @@ def solve(
 
     with leave_on_interrupt(stopped), reporter, ExitStack() as stack:
         # Within the reporter, because CasADi and Pinocchio take seconds to load.
-        from casadi_hands import pipeline
+        import casadi_hands.pipeline as pipeline
         from casadi_hands.execution.cluster import cluster
         from casadi_hands.pipeline import alternatives
 
@@ -234,7 +234,7 @@ def audit(
 
     Exits 1 if any figure misses its limit.
     """
-    from casadi_hands import verify
+    import casadi_hands.verify as verify
     from casadi_hands.cli.summary import audit_summary
 
     found = verify.audit(folder, task=task, replays=replays, jobs=jobs or os.cpu_count() or 1)
@@ -278,7 +278,7 @@ def replay(
     Exits 1 if the object misses a goal by more than the task's limits when nothing perturbs it, or is dropped then, or
     in more of the perturbed replays than the task's limits allow.
     """
-    from casadi_hands import verify
+    import casadi_hands.verify as verify
     from casadi_hands.cli.summary import replay_summary
 
     played = verify.run_replays(folder, perturb, seed, jobs or os.cpu_count() or 1, engine)
