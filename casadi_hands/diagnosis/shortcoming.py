@@ -31,7 +31,7 @@ def shortcoming_reason(model: Model, found: Shortcoming) -> Reason:
     length = 1e3 * model.units.length  # mm
     if found.kind == "press" or found.time is None:
         what = (
-            f"{who} cannot press as its contact needs with {joints}: no joint supplies "
+            f"{who} cannot press as its contact needs with {joints}: no joint actuates "
             f"{found.by:.2f} weights of the force, on average"
         )
         advice = "more joints (search.max_joints) or a contact that is pressed from another side"

@@ -81,7 +81,7 @@ def kept_margin(earlier: Design) -> Margin:
     whole = warm_start(earlier, earlier.task, model)
     if earlier.status != "certified":
         return AMPLE
-    grip, use = np.inf, 0.0
+    least, use = np.inf, 0.0
     for c in whole.contacts:
         active = whole.active[:, c]
         bearing = active & np.append(active[:1], active[:-1])
@@ -90,9 +90,9 @@ def kept_margin(earlier: Design) -> Margin:
         inward = inward_normals(points, [model.touched[c]] * len(points))
         normal = (force * inward).sum(axis=1)
         across = np.linalg.norm(force - normal[:, None] * inward, axis=1)
-        grip = min(grip, float((normal / asked[bearing]).min()))
+        least = min(least, float((normal / asked[bearing]).min()))
         use = max(use, float((across / (model.friction * normal)).max()))
-    kept = (m for m in (LARGE, AMPLE) if grip >= _NEARLY * m.normal_force and _NEARLY * use <= m.friction)
+    kept = (m for m in (LARGE, AMPLE) if least >= _NEARLY * m.normal_force and _NEARLY * use <= m.friction)
     return next(kept, SMALL)
 
 

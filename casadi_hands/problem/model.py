@@ -147,7 +147,7 @@ class Model:
         return bool(np.any(self.regrasp.patches[:, contact] != self.regrasp.patches[0, contact]))
 
     def lifts(self, contact: int) -> bool:
-        """Whether a finger's contact is planned to lift and touch the object anew."""
+        """Whether a finger's contact is planned to lift and touch the object again."""
         return self.regrasp is not None and bool(self.regrasp.lifted[:, contact].any())
 
     @property

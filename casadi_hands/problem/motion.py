@@ -14,7 +14,7 @@ class Motion:
     """The arrays of ``motion.npz``: same names, shapes, units and frames (see ``docs/result-folder.md``).
 
     Commands are None until there is a hand, and in files of versions that did not write them; what is disturbed is None
-    where the task names no perturbation.
+    where the task names no disturbance.
     """
 
     time: np.ndarray

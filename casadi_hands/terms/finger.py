@@ -113,7 +113,7 @@ def null_space_force(jacobian: SX, force: SX, damping: float = NULL_SPACE_DAMPIN
 def structural_force(jacobian: SX, force: SX, least: float) -> SX:
     """The part (3,) of a force for which no joint has a lever: a sharper cut than damping.
 
-    Of a force in a singular direction of the Jacobian with the lever σ, λ⁴/(σ⁴ + λ⁴) counts as not supplied.
+    Of a force in a singular direction of the Jacobian with the lever σ, λ⁴/(σ⁴ + λ⁴) counts as not actuated.
 
     Args:
         jacobian: (3, n) of the contact point, lengths/rad.

@@ -40,10 +40,10 @@ def solve_floating(model: Model, weights: Mapping[str, float]) -> Floating:
     Where they cannot, contacts have their travel limited, which fingers at least can follow.
     """
     floating = FloatingStage(model).solve(weights)
-    anew = planned_regrasp(model, floating.pose)
-    if anew is None:
+    regrasp = planned_regrasp(model, floating.pose)
+    if regrasp is None:
         return floating
-    for plan in (anew, limited_travel(model, floating.pose)):
+    for plan in (regrasp, limited_travel(model, floating.pose)):
         replanned = FloatingStage(replace(model, regrasp=plan)).solve_regrasp(floating, weights)
         if replanned is not None:
             return replanned

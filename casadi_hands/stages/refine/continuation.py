@@ -25,7 +25,7 @@ from casadi_hands.stages.refine.stage import RefineStage
 from casadi_hands.stages.refine.values import Margin
 
 SPARSE, COARSE = 0.4, 0.2  # s between knots, at most
-NEARLY_EXACT = 0.1  # cost of slip and of forces that no joint supplies, of a start that is nearly exact
+NEARLY_EXACT = 0.1  # cost of slip and of forces that no joint actuates, of a start that is nearly exact
 LEAST_STEP = 0.05  # of the homotopy parameter
 LEAST = 0.1  # homotopy parameter for which a first exact motion is looked for
 
@@ -127,7 +127,7 @@ class Continuation:
         stage, found = self._found(partial(self._continued, start, homotopy, margin))
         if larger is not None and found.exact:
             tight = self._named(stage, stage.take(NEARBY_STEPS, self._pressing(found, larger), larger))
-            tight = _after("larger grip,", self._denser(stage, tight, start, larger))
+            tight = _after("larger normal forces,", self._denser(stage, tight, start, larger))
             found = replace(found, runs=found.runs + tight.runs)
             if tight.exact:
                 return replace(tight, runs=found.runs)

@@ -23,7 +23,7 @@ from casadi_hands.terms import constraints as limits
 from casadi_hands.terms import contact as contact_terms
 
 ROUNDING = 1e-6  # lengths, of distances where they vanish
-LEAST_SINGULAR_VALUE = 0.06  # lengths/rad: forces that need a shorter lever than about this count as not supplied
+LEAST_SINGULAR_VALUE = 0.06  # lengths/rad: forces along smaller singular values count as not actuated
 
 
 def free_morphology(kernel: Kernel, joints: int, place: int | None = None) -> FingerSymbols:
@@ -99,7 +99,7 @@ class Scene:
 
 @cache
 def contact(joints: int, kind: type[Body], limited: bool) -> Kernel:
-    """One touching contact at one knot: on both surfaces, normals opposed, in the cone, supplied by the joints.
+    """One touching contact at one knot: on both surfaces, normals opposed, in the cone, actuated by the joints.
 
     Constraints: ``on_object`` (1), ``on_link`` (3: surface and normal, see ``Touch``), those of ``_hold`` and, of a
     finger that has branches, ``regular`` (1: its singularity_margin on the wanted one).
@@ -132,7 +132,7 @@ def contact(joints: int, kind: type[Body], limited: bool) -> Kernel:
 
 @cache
 def disturbed_contact(joints: int, kind: type[Body], limited: bool) -> Kernel:
-    """A second force of a touching contact at one knot: in the cone, and supplied by the joints, as the first."""
+    """A second force of a touching contact at one knot: in the cone, and actuated by the joints, as the first."""
     kernel = Kernel("disturbed_contact")
     symbols = free_morphology(kernel, joints)
     pose, point, angles = kernel.variable("pose", 6), kernel.variable("point", 3), kernel.variable("angles", joints)
@@ -146,7 +146,7 @@ def disturbed_contact(joints: int, kind: type[Body], limited: bool) -> Kernel:
 
 @cache
 def actuated(joints: int, kind: type[Body]) -> Kernel:
-    """A contact's force at any time: ``structural`` (3) is what no joint supplies of it."""
+    """A contact's force at any time: ``structural`` (3) is what no joint actuates of it."""
     kernel = Kernel("actuated")
     symbols = free_morphology(kernel, joints)
     pose, point, angles = kernel.variable("pose", 6), kernel.variable("point", 3), kernel.variable("angles", joints)
@@ -163,7 +163,7 @@ def _hold(
     """Constrain a contact force (3,), object frame; return its normal part, tangential square and structural part.
 
     Constraints: ``pressing`` (1: normal force), ``cone`` (1: (μ f_n)² - f_t²), ``structural`` (3: force no joint
-    supplies), and where the task limits it ``torque`` (n).
+    actuates), and where the task limits it ``torque`` (n).
     """
     pressing = -ca.dot(force, touch.normal)
     across = ca.sumsqr(force + pressing * touch.normal)
@@ -179,7 +179,7 @@ def _hold(
 
 
 def _structural(touch: Touch, force: SX) -> SX:
-    """The part (3,), palm frame, of a contact force, object frame, that no joint supplies."""
+    """The part (3,), palm frame, of a contact force, object frame, that no joint actuates."""
     return finger.structural_force(touch.placed.jacobian, ca.mtimes(touch.rotation, force), LEAST_SINGULAR_VALUE)
 
 

@@ -135,8 +135,8 @@ class RefineStage:
             return solution
         good = self.solver.solve(solution.values, parameters, GOOD, lower, upper, bounds)
         near = (good if np.isfinite(good.violation) else solution).values
-        anchored = {**parameters, **self.built.proximity.at(near)}
-        nearest = self.solver.solve(near, anchored, RESTORATION, lower, upper, bounds)
+        proximal = {**parameters, **self.built.proximity.at(near)}
+        nearest = self.solver.solve(near, proximal, RESTORATION, lower, upper, bounds)
         solves = (solution, good, nearest)
         iterations, seconds = sum(s.iterations for s in solves), sum(s.seconds for s in solves)
         if not nearest.violation < solution.violation:

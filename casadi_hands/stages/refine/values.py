@@ -34,7 +34,7 @@ class Margin:
     Attributes:
         friction: share of μ that may be used.
         normal_force: least normal force of an active contact, m·g.
-        structural: largest component of a force that no joint supplies, m·g.
+        structural: largest component of a force that no joint actuates, m·g.
     """
 
     friction: float = 0.5
@@ -53,7 +53,7 @@ class RefineValues:
     def __init__(self, built: RefineProblem, model: Model) -> None:
         self.structure, self.model, self.proximity = built.structure, model, built.proximity
         self.problem, self.disturbed, self.knots = built.problem, built.disturbed, built.knots
-        # A contact that touches anew bears nothing until it does: its force grows from zero.
+        # A contact that touches again bears nothing until it does: its force grows from zero.
         self._active = active = self.structure.active
         self.bearing = active & np.vstack([active[:1], active[:-1]])
 
@@ -122,7 +122,7 @@ class RefineValues:
         bearing, active = (np.repeat(np.where(f, MOST_FORCE, 0.0), 3, axis=1) for f in (self.bearing, self._active))
         upper = {"rate": rate, "force": bearing}
         if len(self.disturbed):
-            # A perturbation may begin with a touch, and what it is held with is no force that has to grow.
+            # A disturbance may begin with a touch, and what resists it is no force that has to grow.
             upper["force_disturbed"] = active[self.disturbed]
         lower = {name: -bound for name, bound in upper.items()}
         return {"pose": low_pose, **lower}, {"pose": high_pose, **upper}

@@ -26,7 +26,7 @@ class Shortcoming:
             its joints supply too little of its force.
         contact: index of the finger's contact.
         joints: of the finger.
-        by: lengths beyond reach or missed, or the mean force that no joint supplies, m·g.
+        by: lengths beyond reach or missed, or the mean force that no joint actuates, m·g.
         time: s, when this is worst; None of a mean.
     """
 

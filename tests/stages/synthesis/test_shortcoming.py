@@ -100,6 +100,6 @@ def test_a_small_miss_beside_a_large_passive_force_is_not_the_reason() -> None:
     made = hand([pointing(target, 0, [[1, 0, 0]]), pointing(target, 1, [[1, 0, 0]])], (0, 1))
     reason = told(target, made, 0, 50 * 0.05**2 / 3 + 0.7)
     assert reason.what == (
-        "finger 'left' cannot press as its contact needs with 1 joint: no joint supplies 0.70 weights of the force, "
+        "finger 'left' cannot press as its contact needs with 1 joint: no joint actuates 0.70 weights of the force, "
         "on average"
     )
