@@ -60,10 +60,17 @@ def apply(title: str, copy: Path) -> set[str]:
     return touched
 
 
+# An editable installation finds the package by a hook of its own, before any folder.
+UNHOOKED = (
+    "import sys\n"
+    "sys.meta_path[:] = [each for each in sys.meta_path if not type(each).__module__.startswith('_editable')]\n"
+)
+
+
 def run(copy: Path, code: str) -> str:
     """What a program prints that uses the copy."""
     done = subprocess.run(
-        [sys.executable, "-c", code],
+        [sys.executable, "-c", UNHOOKED + code],
         cwd=copy,
         env={**os.environ, "PYTHONPATH": f"{copy}:{ROOT}"},
         capture_output=True,

@@ -312,7 +312,9 @@ def test_a_firmer_grip_is_kept_where_it_is_exact_and_the_other_one_elsewhere(sta
             "hard constraints",
         ],
     }[fails_on]
-    assert [run.what for run in refined.runs if run.margin == firm] == [f"larger normal forces, {step}" for step in steps]
+    assert [run.what for run in refined.runs if run.margin == firm] == [
+        f"larger normal forces, {step}" for step in steps
+    ]
     if fails_on:
         assert [run.what for run in refined.runs[-2:]] == ["coarse hard constraints", "hard constraints"]
     # The whole way with the first margin was gone once.
