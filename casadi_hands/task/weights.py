@@ -71,7 +71,7 @@ _NAMED_IN_TABLE_2_4 = {term.name for term in terms_of("floating")} & {term.name 
 
 
 class Weights(Section):
-    """Weights of the three soft stages; lengths in lengths, forces in weights, times in seconds."""
+    """Weights of the three soft stages; lengths in characteristic lengths, forces in weights, times in seconds."""
 
     floating: FloatingWeights = Field(default=FloatingWeights(), description="Weights of the floating stage.")
     synthesis: SynthesisWeights = Field(default=SynthesisWeights(), description="Weights of the synthesis stage.")
