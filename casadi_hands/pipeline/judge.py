@@ -27,7 +27,7 @@ from casadi_hands.problem.motion import Motion
 from casadi_hands.verify import audit_files, run_replays
 from casadi_hands.verify.report import Audit
 
-# Beyond these, where they are also beyond the limits, a motion is none: lengths in lengths, degrees, m·g.
+# Beyond these, where they are also beyond the limits, a motion is none: characteristic lengths, degrees, m·g.
 FEASIBLE = {
     "goal_position": 0.02,
     "goal_angle": 1.0,

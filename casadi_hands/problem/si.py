@@ -32,7 +32,7 @@ from casadi_hands.task import Task
 
 Array = NDArray[np.float64]
 _WITHIN = 0.9 / math.sqrt(3)  # share of a limit that each of three coordinates may use
-# Lengths. Beyond these a gap is no contact, and slip would need friction on its cone, whatever a task accepts.
+# Lengths: beyond these a gap is no contact, and slip would need friction on its cone, whatever a task accepts.
 _MOST_GAP, _MOST_SLIP = 2e-4, 2e-3
 
 
