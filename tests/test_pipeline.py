@@ -227,7 +227,7 @@ def test_fingers_with_too_few_joints_are_named() -> None:
     assert len(sentences) <= 4
     for finger in ("left", "right"):
         assert any(
-            re.match(rf"finger '{finger}' cannot press as its contact needs with 1 joint: no joint supplies", sentence)
+            re.match(rf"finger '{finger}' cannot press as its contact needs with 1 joint: no joint actuates", sentence)
             for sentence in sentences
         ), design.reason
     assert all("; try " in sentence or "more limit" in sentence for sentence in sentences)
