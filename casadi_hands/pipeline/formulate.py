@@ -126,7 +126,7 @@ def formulate(
     - of ``refine`` the last step of the first refinement of the best hand, on the fewest knots that motions are
       refined on first (0.4 s apart at most, or the task's own samples): the one with hard constraints, or where
       penalties show that contacts must slip, and the stage goes no further, the last of these. What moves contacts
-      too far for fingers to follow is refined over a part of the way first, and then that is the program.
+      too far for fingers to follow is refined at a smaller homotopy parameter first, and then that is the program.
 
     Args:
         task: as ``load_task`` gives it.
@@ -160,7 +160,7 @@ def _posed(record: Record, stage: str, executor: Executor | None) -> tuple[Model
     """The model of a stage's program, which of its solves it is of, and that solve."""
     with keep_solves() as solves:
         floating = run_floating(record, build_model(record.task))
-    model, share = floating.model, 1.0
+    model, homotopy = floating.model, 1.0
     if stage == "floating":
         return model, floating.runs[0][0], solves[0]
     search = prepare_search(record, model, floating, executor)
@@ -169,22 +169,22 @@ def _posed(record: Record, stage: str, executor: Executor | None) -> tuple[Model
         return model, *_together(search)
     begun = model
     if stage == "refine":
-        begun, floating, share = refinable(record, model, floating)
+        begun, floating, homotopy = refinable(record, model, floating)
     with keep_solves() as solves:
         whole = run_whole_hand(record, begun, floating, found.candidates[0])
     if stage == "whole_hand":
         return model, "hand", solves[0]
-    return _refined(record, model, whole, share)
+    return _refined(record, model, whole, homotopy)
 
 
-def _refined(record: Record, model: Model, whole: WholeHand, share: float) -> tuple[Model, str, Solve]:
+def _refined(record: Record, model: Model, whole: WholeHand, homotopy: float) -> tuple[Model, str, Solve]:
     """The first refinement of a hand: its last step."""
     continuation = Continuation(model, whole.contacts, tuple(f.joints for f in whole.fingers), whole.active)
     with record.stage("refine", "the first refinement"), keep_solves() as solves:
-        runs = continuation.begin(whole, AMPLE, share).runs
+        runs = continuation.begin(whole, AMPLE, homotopy).runs
     # Hard constraints, which are the last step, may be followed by solves that look for the nearest exact motion.
     knots = len(continuation.sparse.model.schedule.samples)
-    step = f"{runs[-1].what} on {knots} knots" + (f" over {share:.0%} of the way" if share < 1 else "")
+    step = f"{runs[-1].what} on {knots} knots" + (f" at homotopy {homotopy:.2g}" if homotopy < 1 else "")
     return continuation.sparse.model, step, solves[len(runs) - 1]
 
 

@@ -32,7 +32,7 @@ def floating_motion(model: Model, floating: Floating) -> Motion:
     count = len(schedule.samples)
     point = sampled_points(model, floating.point)
     active = floating.active[schedule.sample_keyframes]
-    names = model.contact_names + (("ground",) if model.ground is not None else ())
+    names = tuple(contact.name for contact in model.contact_table)
     links = ["none"] * model.contacts + (["ground"] if model.ground is not None else [])
     force, nowhere, angles = floating.force * active[:, :, None], np.zeros_like(point), np.zeros((count, 0))
     palm = model.palm_position, model.palm_quaternion
@@ -45,7 +45,7 @@ def whole_hand_motion(model: Model, result: WholeHand) -> Motion:
     A contact without a finger, since it never acts, is left out.
     """
     count = len(result.force)
-    names = model.contact_names + (("ground",) if model.ground is not None else ())
+    names = tuple(contact.name for contact in model.contact_table)
     point = np.array([on_bodies(p, model.touched) for p in result.point])
     on_link = np.zeros_like(point)
     links = ["none"] * model.contacts + (["ground"] if model.ground is not None else [])

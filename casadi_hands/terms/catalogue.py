@@ -5,7 +5,6 @@ from __future__ import annotations
 from casadi_hands.declared import Term
 from casadi_hands.terms import body, clearance, contact, finger
 
-STAGES = ("floating", "synthesis", "whole_hand", "refine")
 # A term that is declared in one of these modules is found by itself.
 _MODULES = body, contact, clearance, finger
 

@@ -1,7 +1,7 @@
 """What a body is: a convex core swept by a ball, in numbers and in symbols.
 
 To add a shape, add a module with one class to this folder: it is found by itself, and so is its place in task files.
-What a shape does not say raises ``NotImplementedError``.
+A class that leaves something out cannot be made: Python's ``TypeError`` names what is missing.
 """
 
 from __future__ import annotations
@@ -78,13 +78,12 @@ class Surface:
         distance = norm(offset, rounding)
         return distance - self.core.depth(point) - self.radius, offset / distance
 
-    def project(self, point: SX) -> tuple[SX, SX, SX]:
-        """The nearest point (3,) of the surface, the outward unit normal there (3,), and the signed distance."""
+    def project(self, point: SX) -> tuple[SX, SX]:
+        """The nearest point (3,) of the surface and the outward unit normal there (3,)."""
         offset = self.core.offset(point)
         distance = norm(offset)
         normal = offset / distance
-        outside = distance - self.core.depth(point)
-        return point + (self.radius - outside) * normal, normal, outside - self.radius
+        return point + (self.radius - (distance - self.core.depth(point))) * normal, normal
 
 
 @dataclass(frozen=True, eq=False)

@@ -102,7 +102,7 @@ def contact(joints: int, kind: type[Body], limited: bool) -> Kernel:
     """One touching contact at one knot: on both surfaces, normals opposed, in the cone, actuated by the joints.
 
     Constraints: ``on_object`` (1), ``on_link`` (3: surface and normal, see ``Touch``), those of ``_hold`` and, of a
-    finger that has branches, ``regular`` (1: its singularity_margin on the wanted one).
+    finger whose joints can be singular, its ``singularity_margin`` (1) on the wanted side of zero.
     The cost of friction is the fourth power of the share in use.
     """
     kernel = Kernel("contact")

@@ -46,8 +46,8 @@ class Refined:
         met: whether every constraint is met within ``ACCEPTED``.
         worst: of the motion's constraints.
         slips: for each contact, lengths, what the last solve left that did not forbid slip, or else the last.
-        slips_hopelessly: whether the firm solves were left with so much slip that no exact one was tried.
-        barely_rolls: whether rolling is out of the structure's reach, or so nearly that a firmer solve had to look
+        slips_hopelessly: whether the stiff penalties were left with so much slip that no exact one was tried.
+        barely_rolls: whether rolling is out of the structure's reach, or so nearly that a stiffer penalty had to look
             for it.
         runs: every solve.
         weights: of the terms of the motion's solve.

@@ -29,8 +29,9 @@ _LOOSE = (("dual_inf_tol", 1e3), ("compl_inf_tol", 1e-3))
 GOOD = replace(NEARBY, max_iter=60, tol=0.3, acceptable_tol=0.3, constr_viol_tol=1e-4, extra=(*_NEAR, *_LOOSE))
 RESTORATION = replace(NEARBY, max_iter=60)
 ACCEPTED = 1e-7  # largest violation with which a refined motion is handed on
-HOPELESS = 0.1  # lengths of slip: where firm solves leave more, rolling is out of the structure's reach
-FALLING = 0.5  # of the soft solve's slip: where the firm one leaves more than hopeless, but less than this, it goes on
+HOPELESS = 0.1  # lengths of slip: where stiff penalties leave more, rolling is out of the structure's reach
+# Of the first penalty's slip: where the stiff one leaves more than hopeless, but less than this, it goes on.
+FALLING = 0.5
 WEIGHTS = {term.name: single(term.weights["refine"].default) for term in terms_of("refine")}
 STIFF = {"slip": 100.0, "passive_force": 30.0}
 STIFFER = STIFF | {"slip": 1000.0}
@@ -42,7 +43,7 @@ ALL_STEPS: tuple[Step, ...] = (
     ("stiffer penalty", WEIGHTS | STIFFER, STIFF_PENALTY),
     ("hard constraints", WEIGHTS | HARD, HARD_CONSTRAINTS),
 )
-# From an exact motion to one nearby; the first step can be left out where joints can follow and supply their forces.
+# From an exact motion to one nearby; the first step can be left out where joints can follow and actuate the forces.
 NEARBY_STEPS: tuple[Step, ...] = (ALL_STEPS[1], ALL_STEPS[-1])
 LAST_STEP: tuple[Step, ...] = NEARBY_STEPS[-1:]
 RENEWED_STEPS: tuple[Step, ...] = (("hard constraints", WEIGHTS | HARD, NEARBY),)

@@ -86,7 +86,7 @@ class RefineStage:
         homotopy: float = 1.0,
         wanted: WholeHand | None = None,
     ) -> Refined:
-        """Solve step by step; not to the end where firm solves show rolling to be out of reach.
+        """Solve step by step; not to the end where stiff penalties show rolling to be out of reach.
 
         Args:
             steps: solves, each from where the one before ended.

@@ -45,7 +45,7 @@ def touch(joints: int, moves: bool) -> Kernel:
     on_link = ca.mtimes(skeleton.tip_rotation.T, in_palm - last)
     here = symbols.placed(angles, radius, on_link)
     link = Surface(Segment(SX.zeros(3, 1), ca.vertcat(0, 0, symbols.lengths[-1])), radius)
-    projection, normal, _ = link.project(on_link)
+    projection, normal = link.project(on_link)
     force_in_palm = palm.turned(ca.mtimes(rotation, force))
     kernel.cost(contact.CONTACT_ON_FINGER, contact.off_surface(force, invariant, on_link, projection))
     position_before, quaternion_before = placed(pose_before, reference)

@@ -61,7 +61,7 @@ def check_numbers(body: Body, placed: Placed, rng: np.random.Generator) -> None:
 
 
 def surface_function(body: Body) -> ca.Function:
-    """Point (3,) and parameters -> distance, normal of one way, and projection, normal, distance of the other."""
+    """Point (3,) and parameters -> distance and normal of one way, and projection and normal of the other."""
     point, parameters = ca.SX.sym("point", 3), ca.SX.sym("parameters", body.width)
     surface = type(body).surface(parameters)
     return ca.Function("f", [point, parameters], [*surface.distance_and_normal(point), *surface.project(point)])
@@ -80,12 +80,10 @@ def check_symbols(body: Body, rng: np.random.Generator, off: float, turned: floa
     for point in around(body, rng, 200):
         if np.linalg.norm(body.core_offset(point)) < 0.02:
             continue  # of next to nothing there is no direction
-        distance, normal, projection, same, again = (
-            np.asarray(value).ravel() for value in function(point, body.parameters)
-        )
+        distance, normal, projection, same = (np.asarray(value).ravel() for value in function(point, body.parameters))
         np.testing.assert_allclose(distance, body.signed_distance(point), atol=off)
         np.testing.assert_allclose(normal, body.outward(point), atol=turned)
-        np.testing.assert_allclose([*same, *again], [*normal, *distance], atol=1e-9)
+        np.testing.assert_allclose([*same, *(point - distance * same)], [*normal, *projection], atol=1e-9)
         np.testing.assert_allclose(projection, body.on_surface(point), atol=turned * max(1.0, abs(float(distance[0]))))
 
 

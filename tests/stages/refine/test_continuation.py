@@ -185,7 +185,7 @@ def test_what_misses_less_is_exact_goes_farther_rolls_or_violates_less(start: Wh
 
 
 def test_what_slips_only_on_coarse_knots_is_not_said_to_slip(start: WholeHand) -> None:
-    # On sparse knots it rolls, and near that motion it misses less than where firm solves go from there.
+    # On sparse knots it rolls, and near that motion it misses less than where stiff penalties go from there.
     told = Told(lambda level, homotopy, margin: level == "sparse", hopeless=lambda level, way: way == SHORT)
     refined = told.solve(start, Margin())
     assert told.ways == [("sparse", LONG), ("coarse", "hard constraints"), ("coarse", SHORT)]
