@@ -23,7 +23,7 @@ from shared import options_of, table_text
 from tables import add_json, write_record
 
 from casadi_hands.export.design import Design
-from casadi_hands.verify import Replays, run_replays
+from casadi_hands.verify import replay, replay_many
 
 PLAYER = Path(__file__).parents[1] / "examples" / "play.py"
 PERTURBED = 5
@@ -47,7 +47,10 @@ def main() -> None:
         design = Design.load(folder)
         assert design.hand is not None
         joints = "+".join(str(len(finger.links)) for finger in design.hand.fingers)
-        played = {name: run_replays(folder, PERTURBED, 0, given.jobs, name) for name in ("mujoco", "drake")}
+        played = {
+            name: [replay(folder, engine=name), *replay_many(folder, PERTURBED, 0, given.jobs, name)]
+            for name in ("mujoco", "drake")
+        }
         rows.append(
             (
                 design.task.name,
@@ -57,10 +60,10 @@ def main() -> None:
                 *loaded(folder, design),
             )
         )
-        first, second = (drops_of(played[name]) for name in played)
+        first, second = ([each.dropped for each in those] for those in played.values())
         agree = [a == b for a, b in zip(first, second, strict=True)]
         same += agree
-        means = [f"{1e3 * p.nominal.position_mean:.2g} mm · {p.nominal.angle_mean:.2g}°" for p in played.values()]
+        means = [f"{1e3 * each.position_mean:.2g} mm · {each.angle_mean:.2g}°" for each, *_ in played.values()]
         engines.append((design.task.name, *means, marks(first), marks(second), f"{sum(agree)}/{len(agree)}"))
         print(" | ".join((*rows[-1], *engines[-1][1:])), flush=True)
     write_record(given.json, "outside", HEAD, rows)
@@ -91,7 +94,7 @@ def apart(folder: Path, design: Design) -> str:
     """How far the player's end is from the replay's, by their errors against the plan."""
     said = subprocess.run([sys.executable, str(PLAYER), str(folder)], capture_output=True, text=True, check=True).stdout
     pose = np.array([float(word) for word in said.split()[1:8]])
-    motion, nominal = design.motion, run_replays(folder, 0).nominal
+    motion, nominal = design.motion, replay(folder)
     assert motion is not None
     away = float(np.linalg.norm(pose[:3] - motion.object_position[-1]))
     planned, turned = (Rotation.from_quat(q, scalar_first=True) for q in (motion.object_orientation[-1], pose[3:]))
@@ -119,13 +122,8 @@ def checked(folder: Path) -> str:
     return f"{levels.count('error')}, {levels.count('warning')}"
 
 
-def drops_of(played: Replays) -> list[bool]:
-    """Whether the object is dropped: unperturbed, then in each perturbed replay."""
-    return [played.nominal.dropped, *(each.dropped for each in played.perturbed)]
-
-
 def marks(dropped: list[bool]) -> str:
-    """One letter a replay: h for held, D for dropped."""
+    """One letter a replay, the one as planned first: h for held, D for dropped."""
     return "".join("D" if each else "h" for each in dropped)
 
 

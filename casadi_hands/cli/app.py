@@ -224,9 +224,9 @@ def audit(
     replays: Annotated[
         int,
         typer.Option(
-            min=0, metavar="N", help="Perturbed replays, where all else holds; 0 for no replays in MuJoCo at all."
+            min=0, metavar="N", help="Replays with all perturbed at once, beside those with one thing; 0 for none."
         ),
-    ] = 12,
+    ] = 4,
     jobs: Jobs = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
 ) -> None:
@@ -260,7 +260,7 @@ def replay(
         typer.Option(
             min=0,
             metavar="N",
-            help="Replay N times more, each with another mass, friction, joint bias, push and start pose.",
+            help="Replay with one thing perturbed at a time, too, and N times with everything at once.",
         ),
     ] = 0,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the perturbations.")] = 0,

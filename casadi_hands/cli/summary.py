@@ -95,7 +95,7 @@ def certificate_table(certificate: Mapping[str, Mapping[str, Any]]) -> Table:
 
 def replay_summary(played: Replays) -> RenderableType:
     """Errors of the replay as planned, at the goals too, and of those perturbed ones that kept the object."""
-    nominal, perturbed = played.nominal, played.perturbed
+    nominal, perturbed = played.nominal, list(played.perturbed.values())
     table = Table(box=SIMPLE_HEAD, collapse_padding=True, pad_edge=False)
     table.add_column("", no_wrap=True)
     for column in ("mean mm", "max mm", "end mm", "mean deg", "max deg", "end deg"):

@@ -23,7 +23,7 @@ from casadi_hands.stages.refine.result import Refined
 from casadi_hands.stages.synthesis.algorithm import Candidate, Found, Search
 
 Array = NDArray[np.float64]
-LONG_DROPS = 6  # of the replays: where more drop the object, all hands of a structure are tried
+LONG_DROPS = 0.5  # share of the replays: where more drop the object, all hands of a structure are tried
 OUT_OF_REACH = 0.3  # lengths that a finger misses its contact by: nothing is left to refine
 SURELY = np.pi / 2  # that an object may turn so that contacts can surely go with it
 HANDS_REFINED = 2  # hands of one structure that are tried, and more only where nothing else is left to try
@@ -63,7 +63,7 @@ class Certifier:
             return self.record.update_best(self.record.held_to_bounds(self.judge.judge(self.record.design, short)))
         while True:
             failing: set[str] = set()
-            fewest = np.inf  # drops of a hand whose files hold
+            fewest = np.inf  # share of replays that drop the object, of a hand whose files hold
             for k, candidate in enumerate(found.candidates):
                 may_grow = fewest == np.inf and self._more_joints(found, failing) is not None
                 if k >= HANDS_REFINED and (fewest <= LONG_DROPS or may_grow):
@@ -74,7 +74,7 @@ class Certifier:
                     return best
                 self.record.log("refine", f"not certified: {judged.reason}")
                 if judged.drops is not None:
-                    fewest = min(fewest, judged.drops)
+                    fewest = min(fewest, judged.drops / judged.replays[0]["of"])
                 failing |= failing_fingers(self.model, refined)
                 if refined.barely_rolls:
                     break  # a structure that must slip will do so in any of its hands

@@ -22,7 +22,6 @@ from casadi_hands.stages.refine.continuation import Continuation
 from casadi_hands.stages.refine.result import Refined
 from casadi_hands.stages.refine.values import Margin
 from casadi_hands.stages.synthesis.algorithm import run_record
-from casadi_hands.verify import REPLAYS
 from casadi_hands.verify.report import Audit
 
 Array = NDArray[np.float64]
@@ -87,8 +86,7 @@ class Refiner:
                 judged, refined, stage = design, other, halved
         judged = self._replayed(judged)
         if judged.drops and refined.margin != LARGE:
-            dropped = f"{judged.drops} of {REPLAYS} replays dropped the object"
-            text = f"again with a larger lower bound on normal forces: {dropped}"
+            text = f"again with a larger lower bound on normal forces: {judged.replay_words}"
             larger = self._with_margin(whole, refined, stage, LARGE, text)
             design = self._replayed(self._judged(stage.model, larger, short, planned))
             if rank_of(design) < rank_of(judged):

@@ -3,11 +3,11 @@
 from casadi_hands.verify.audit import audit, audit_files
 from casadi_hands.verify.replays.perturb import Perturbation
 from casadi_hands.verify.replays.replay import Replay, replay, replay_many
-from casadi_hands.verify.replays.series import REPLAYS, Replays, run_replays
+from casadi_hands.verify.replays.series import TOGETHER, Replays, run_replays
 from casadi_hands.verify.report import Audit, Figure
 
 __all__ = [
-    "REPLAYS",
+    "TOGETHER",
     "Audit",
     "Figure",
     "Perturbation",

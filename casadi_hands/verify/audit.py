@@ -28,18 +28,19 @@ from casadi_hands.verify.figures.dynamics import Shots, between_residual, sample
 from casadi_hands.verify.figures.goals import goal_figures, rest_figure
 from casadi_hands.verify.figures.wrench import disturbance_figure, torque_figure, unsupplied_figure
 from casadi_hands.verify.reading.folder import Folder, read_folder
-from casadi_hands.verify.replays.series import REPLAYS, run_replays
+from casadi_hands.verify.replays.series import TOGETHER, run_replays
 from casadi_hands.verify.report import Audit, Figure
 from casadi_hands.verify.trajectory import build_trajectory, sample_placements
 
 
-def audit(directory: str | Path, *, task: str | Path | None = None, replays: int = REPLAYS, jobs: int = 1) -> Audit:
+def audit(directory: str | Path, *, task: str | Path | None = None, replays: int = TOGETHER, jobs: int = 1) -> Audit:
     """Recompute every figure of a result folder and hold it against the task's limits.
 
     Args:
         directory: the result folder.
         task: file of a task that is trusted, to judge by in place of the folder's.
-        replays: perturbed replays, beside one as planned, where all else holds; 0 for no replays at all.
+        replays: those with everything perturbed at once, beside those with one thing at a time and one as planned,
+            where all else holds; 0 for no replays at all.
         jobs: processes for them; the outcome does not depend on it.
 
     Raises:

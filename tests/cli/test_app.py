@@ -401,7 +401,8 @@ def test_replay_prints_errors_and_drops(monkeypatch: pytest.MonkeyPatch) -> None
 
     def run_replays(*arguments: Any) -> Replays:
         asked.append(arguments)
-        return Replays("mujoco", example_task(), 1e-3, 7, nominal, tuple(many[: arguments[1]]))
+        perturbed = {f"number {k}": each for k, each in enumerate(many[: arguments[1]])}
+        return Replays("mujoco", example_task(), 1e-3, 7, nominal, perturbed)
 
     nominal = outcome(0.5)
     monkeypatch.setattr(casadi_hands.verify, "run_replays", run_replays)
@@ -417,7 +418,7 @@ def test_replay_prints_errors_and_drops(monkeypatch: pytest.MonkeyPatch) -> None
     # One in three is more than a tenth; an object that is far from a goal is, too, and one that is dropped.
     found = run("replay", "folder", "--perturb", 3)
     assert found.exit_code == 1
-    assert "in MuJoCo 1 of 3 perturbed replays drop the object, 33.3 %; limit 10 %" in found.output
+    assert "1 of 3 perturbed replays drop the object (number 2), 33.3 %; limit 10 %" in " ".join(found.output.split())
     nominal = outcome(4.0)
     found = run("replay", "folder")
     assert found.exit_code == 1

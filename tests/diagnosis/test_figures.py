@@ -132,7 +132,7 @@ def test_the_first_motors_that_bring_the_hand_to_every_goal_are_named(monkeypatc
     def seen(millimetres: float, dropped: bool = False) -> Replays:
         goals = tuple(GoalError(1e-3 * millimetres, 1.0) for _ in design.task.motion)
         nominal = Replay(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, dropped, (), Perturbation(), goals)
-        return Replays("mujoco", design.task, 1e-3, 0, nominal, ())
+        return Replays("mujoco", design.task, 1e-3, 0, nominal, {})
 
     tried = [
         (Perturbation(effort=2.0, squeeze=2.0), seen(9.0)),

@@ -24,6 +24,8 @@ from casadi_hands.verify import Perturbation, replay
 from casadi_hands.verify.reading.folder import Folder, read_folder
 from casadi_hands.verify.replays.drake import DrakeSimulation, load_drake
 from casadi_hands.verify.replays.drake_scene import PATCH, PRESS
+from casadi_hands.verify.replays.perturb import suite
+from casadi_hands.verify.replays.replay import can_play
 from casadi_hands.verify.replays.simulation import Plan
 from tests.verify.fixture import MASS, RADIUS, Scene, carried
 
@@ -200,6 +202,62 @@ def test_stiffer_motors_press_as_planned(folder: Folder) -> None:
         moved.append(_angles(folder, scene) - folder.motion.joint_angles[0])
     assert moved[0] == pytest.approx(np.full(6, 0.02), abs=1e-5)
     assert moved[1] == pytest.approx(np.full(6, 0.01), abs=1e-5)
+
+
+def test_commands_press_by_the_squeeze(folder: Folder) -> None:
+    steps = round(0.3 / DrakeSimulation.step)
+    scene, ahead = _away(folder, squeeze=1.5), np.tile(folder.motion.joint_angles[0] + 0.02, (steps + 1, 1))
+    _still(folder, scene, 0.3, commands=ahead)
+    assert _angles(folder, scene) - folder.motion.joint_angles[0] == pytest.approx(np.full(6, 0.03), abs=1e-5)
+
+
+def test_commands_come_late_by_the_delay(folder: Folder) -> None:
+    """What is 10 ms late is where the other was 10 ms before."""
+    steps = 40
+    rise = folder.motion.joint_angles[0] + 0.1 * (np.arange(steps + 1) / steps)[:, None]
+    paths = []
+    for delay in (0.0, 0.01):
+        scene = _away(folder, delay=delay)
+        plan, path = _plan(folder, steps, angles=rise, commands=rise), []
+        for i in range(steps):
+            scene.play(plan, i, np.zeros(3), None)
+            path.append(_angles(folder, scene))
+        paths.append(np.array(path))
+    late = round(0.01 / DrakeSimulation.step)
+    assert np.abs(paths[0][-1] - paths[0][0]).min() > 0.02
+    assert paths[1][late:] == pytest.approx(paths[0][:-late], abs=1e-5)
+
+
+def test_links_sag_by_what_they_weigh_beyond_the_plan(folder: Folder) -> None:
+    """Each joint gives by Pinocchio's torque of the weight that nothing carries."""
+    scene = _away(folder, link_mass=1.5)
+    _still(folder, scene, 0.3)
+    model, base = folder.model.copy(), Rotation.from_quat(folder.motion.base_orientation[0], scalar_first=True)
+    model.gravity.linear = 0.5 * base.inv().apply(folder.gravity)
+    columns, angles = folder.joint_columns(), np.zeros(model.nq)
+    angles[columns] = folder.motion.joint_angles[0]
+    torque = pin.rnea(model, model.createData(), angles, np.zeros(model.nv), np.zeros(model.nv))[columns]
+    drives = ElementTree.parse(folder.path / "scene.xml").getroot().iter("position")
+    stiffness = {drive.get("joint"): float(drive.get("kp", "nan")) for drive in drives}
+    expected = -torque / [stiffness[name] for name in folder.motion.joint_names]
+    assert np.abs(expected).max() > 1e-5
+    off = _angles(folder, scene) - folder.motion.joint_angles[0]
+    assert off == pytest.approx(expected, abs=0.03 * np.abs(expected).max())
+    heavier, planned = (
+        each._plant.CalcTotalMass(each._context, [each._hand]) - each._palm.get_mass(each._context)
+        for each in (scene, _away(folder))
+    )
+    assert heavier == pytest.approx(1.5 * planned)
+
+
+def test_torsion_is_refused_and_left_out_of_the_suite(folder: Folder) -> None:
+    with pytest.raises(HandsError, match="patches"):
+        _away(folder, torsion=2.0)
+    told = {name for name, each in suite(folder, 0, 1).items() if can_play("drake", each)}
+    assert set(suite(folder, 0, 1)) - told == {
+        "torsional friction of 0",
+        *(f"torsional friction times {factor}" for factor in ("0.5", "2", "4")),
+    }
 
 
 @pytest.mark.parametrize("factor", [1.0, 0.8])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -22,7 +23,7 @@ NEAR = played((1e-3, 1.0), (2e-3, 4.0), (1e-3, 2.0))
 
 
 def test_the_worst_goal_is_named_with_its_time() -> None:
-    seen = Replays("drake", TASK, 1e-3, 0, played((1e-3, 1.0), (2e-3, 6.0), (4e-3, 2.0)), ())
+    seen = Replays("drake", TASK, 1e-3, 0, played((1e-3, 1.0), (2e-3, 6.0), (4e-3, 2.0)), {})
     position, angle = seen.figures()
     assert (position.value, position.limit, position.holds) == (4e-3, pytest.approx(3e-3), False)
     assert position.text == "in Drake the object is 4 mm from goal 3 at 2 s"
@@ -32,11 +33,12 @@ def test_the_worst_goal_is_named_with_its_time() -> None:
 
 @pytest.mark.parametrize(("drops", "holds"), [(0, True), (1, True), (2, False)])
 def test_a_tenth_of_the_perturbed_replays_may_drop_the_object(drops: int, holds: bool) -> None:
-    perturbed = tuple(played(dropped=k < drops) for k in range(12))
+    perturbed = {f"number {k}": played(dropped=k < drops) for k in range(12)}
     seen = Replays("mujoco", TASK, 1e-3, 0, NEAR, perturbed)
     *_, dropped = seen.figures()
     assert (dropped.name, dropped.value, dropped.holds) == ("replay_dropped", drops / 12, holds)
     assert seen.drops == drops
+    assert seen.dropping == ("number 0", "number 1")[:drops]
     assert seen.dropped_before() is None
     record = json.loads(json.dumps(seen.record(), allow_nan=False))
     assert (record["dropped"], record["of"], record["dropped_as_planned"]) == (drops, 12, False)
@@ -46,7 +48,24 @@ def test_a_tenth_of_the_perturbed_replays_may_drop_the_object(drops: int, holds:
 
 def test_an_object_dropped_as_planned_counts_as_dropped_always() -> None:
     lost = played((1e-3, 1.0), (0.3, 90.0), (0.3, 90.0), dropped=True)
-    seen = Replays("mujoco", TASK, 1e-3, 0, lost, (NEAR,) * 12)
+    seen = Replays("mujoco", TASK, 1e-3, 0, lost, {f"number {k}": NEAR for k in range(12)})
     *_, dropped = seen.figures()
     assert (dropped.value, dropped.holds, seen.drops) == (1.0, False, 12)
     assert seen.dropped_before() == "in MuJoCo the object is dropped before goal 2 at 1 s"
+
+
+@pytest.mark.parametrize(
+    ("drops", "words"),
+    [(0, ""), (1, " (number 0)"), (3, " (number 0, number 1, number 2)"), (4, " (number 0, number 1, number 2, …)")],
+)
+def test_some_of_the_replays_that_drop_the_object_are_named(drops: int, words: str) -> None:
+    perturbed = {f"number {k}": played(dropped=k < drops) for k in range(40)}
+    *_, dropped = Replays("mujoco", TASK, 1e-3, 0, NEAR, perturbed).figures()
+    assert dropped.text == f"in MuJoCo {drops} of 40 perturbed replays drop the object{words}, {2.5 * drops:.3g} %"
+
+
+def test_the_record_says_what_was_perturbed() -> None:
+    change = Perturbation(stiffness=0.5, joint_bias=(0.01, -0.01))
+    seen = Replays("mujoco", TASK, 1e-3, 0, NEAR, {"both": replace(NEAR, perturbation=change), "nothing": NEAR})
+    settings = json.loads(json.dumps(seen.record()))["settings"]
+    assert settings["suite"] == {"both": {"stiffness": 0.5, "joint_bias": [0.01, -0.01]}, "nothing": {}}

@@ -22,7 +22,9 @@ What does not:
   pressure's gradient is such that six times the object's weight makes a patch of 0.375 of the fingertip's radius.
   Fingertips then give as in MuJoCo: by 0.2 to 1 mm in the designs measured, the two within a factor of 1.6 or so.
 - *Torsional friction* is what such a patch has by itself, (8/15)·μ·radius of the patch: as much as MuJoCo's at the
-  force just named, and with the fourth root of the force less below it, usually 0.6 to 1 of MuJoCo's.
+  force just named where the task has a rubber fingertip's, and with the fourth root of the force less below it, usually
+  0.6 to 1 of MuJoCo's. It is no number that could be given: whatever else the task says of torsion is not played, and
+  neither are perturbations of it (`can_play`), which are refused.
 - *Damping* in contacts is Hunt and Crossley's, with MuJoCo's relaxation time, 0.02 s, at that patch's depth. It never
   pulls.
 - *The ground* is rigid, and a patch on it resists twisting; in ``scene.xml`` nothing does there.
@@ -71,12 +73,15 @@ class DrakeSimulation:
 
         Raises:
             DesignError: a file is missing, unreadable, or not of this hand.
-            HandsError: Drake is not installed or cannot be loaded.
+            HandsError: Drake is not installed or cannot be loaded, or cannot be told of the perturbation.
         """
+        if perturbation.torsion != 1.0:
+            raise HandsError("Drake's contacts are patches, whose torsional friction is their own: no factor of it")
         self._drake = drake = load_drake()
         self._names = folder.motion.joint_names
         motors, self._moves = read_motors(folder, perturbation)
-        self._stiffer = perturbation.stiffness
+        self._harder = perturbation.squeeze / perturbation.stiffness
+        self._late = round(perturbation.delay / STEP)
         self._bias = np.asarray(perturbation.joint_bias or np.zeros(len(self._names)))
         builder = drake.systems.framework.DiagramBuilder()
         config = drake.multibody.plant.MultibodyPlantConfig(
@@ -150,11 +155,25 @@ class DrakeSimulation:
         self._center = np.asarray(body.get_com())
         about_center = scaled.Shift(self._center).CalcRotationalInertia()
         self._inertia = np.asarray(about_center.CopyToFullMatrix3())
+        self._unborne = list(self._make_links_heavier(folder, perturbation.link_mass))
         if self._moves:
             palm = make.SolidSphereWithMass(HEAVY * self._mass, folder.length)
             self._palm.SetSpatialInertiaInBodyFrame(context, palm)
             self._palm_inertia = float(palm.CalcRotationalInertia().get_moments()[0])
             plant.SetFreeBodyPose(context, self._palm, self._base)
+
+    def _make_links_heavier(self, folder: Folder, factor: float) -> Iterator[Any]:
+        """Yield what links then weigh beyond the plan, which is what the hand carries."""
+        if factor == 1.0:
+            return
+        for name in folder.links:
+            if name != "palm":
+                link = self._plant.GetBodyByName(name, self._hand)
+                inertia, mass = link.CalcSpatialInertiaInBodyFrame(self._context), link.get_mass(self._context)
+                center, unit = np.asarray(inertia.get_com()), inertia.get_unit_inertia()
+                scaled = self._drake.multibody.tree.SpatialInertia(factor * mass, center, unit)
+                link.SetSpatialInertiaInBodyFrame(self._context, scaled)
+                yield self._wrench(link, center, (factor - 1.0) * mass * folder.gravity, np.zeros(3))
 
     def object_pose(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the object's position (3,) and quaternion (4,) [w, x, y, z], world."""
@@ -189,8 +208,7 @@ class DrakeSimulation:
                 force, torque = self._support(1.0 - max(0.0, time - SQUEEZE) / RELEASE)
                 # What the fingers do not bear yet: on its springs alone the object would sag and be gripped there.
                 force = force - (1.0 - squeeze) * self._mass * self._plant.gravity_field().gravity_vector()
-            ahead = squeeze * (plan.commands[0] - plan.angles[0])
-            self._follow(plan, 0, 0, ahead, plan.external_force[0] + force, plan.external_torque[0] + torque)
+            self._follow(plan, 0, 0, squeeze, plan.external_force[0] + force, plan.external_torque[0] + torque)
             self._advance(observer)
 
     def _support(self, share: float) -> tuple[np.ndarray, np.ndarray]:
@@ -207,18 +225,19 @@ class DrakeSimulation:
 
     def play(self, plan: Plan, i: int, push: np.ndarray, observer: Observer | None) -> None:
         """Drive the hand as planned for a step, and make it; ``push`` (3,) is a force on the object, N, world."""
-        ahead = plan.commands[i] - plan.angles[i]
-        self._follow(plan, i, min(i + 1, len(plan) - 1), ahead, plan.external_force[i] + push, plan.external_torque[i])
+        force, torque = plan.external_force[i] + push, plan.external_torque[i]
+        self._follow(plan, i, min(i + 1, len(plan) - 1), 1.0, force, torque)
         self._advance(observer)
 
     def _follow(
-        self, plan: Plan, i: int, following: int, ahead: np.ndarray, force: np.ndarray, torque: np.ndarray
+        self, plan: Plan, i: int, following: int, squeeze: float, force: np.ndarray, torque: np.ndarray
     ) -> None:
-        """Set the motors' set points, ``ahead`` (J,) rad of the planned angles, and the wrenches for a step."""
-        targets = plan.angles[i] + self._bias + ahead / self._stiffer
+        """Set the motors' set points, with a share of what they are ahead of planned angles, and a step's wrenches."""
+        told = max(i - self._late, 0)
+        targets = plan.angles[told] + self._bias + squeeze * self._harder * (plan.commands[told] - plan.angles[told])
         desired = np.concatenate([targets[self._order], np.zeros(len(targets))])
         self._plant.get_desired_state_input_port(self._hand).FixValue(self._context, desired)
-        wrenches = [self._wrench(self._object, self._center, force, torque)]
+        wrenches = [self._wrench(self._object, self._center, force, torque), *self._unborne]
         if self._moves:
             turn = Rotation.from_quat(plan.palm_quaternion[following], scalar_first=True)
             wrenches.append(self._carry(turn, plan.palm_position[following]))

@@ -103,7 +103,7 @@ def replay(
 
 
 def replay_many(directory: str | Path, n: int, seed: int = 0, jobs: int = 1, engine: str = "mujoco") -> list[Replay]:
-    """Play the motion ``n`` times, each perturbed in its own way; the seed and the number fix how.
+    """Play the motion ``n`` times, everything perturbed at once; the seed and the number fix how.
 
     Args:
         directory: the result folder.
@@ -116,14 +116,30 @@ def replay_many(directory: str | Path, n: int, seed: int = 0, jobs: int = 1, eng
         DesignError, HandsError: as `replay`.
     """
     folder = read_folder(directory)
-    drawn = [draw_perturbation(folder, seed, number) for number in range(n)]
+    return replay_each(directory, [draw_perturbation(folder, seed, number) for number in range(n)], jobs, engine)
+
+
+def replay_each(
+    directory: str | Path, perturbations: Sequence[Perturbation], jobs: int = 1, engine: str = "mujoco"
+) -> list[Replay]:
+    """Play the motion once for each perturbation.
+
+    Args:
+        directory: the result folder.
+        perturbations: what is different from the plan in each replay.
+        jobs: processes; the outcome does not depend on it.
+        engine: one of ``ENGINES``.
+
+    Raises:
+        DesignError, HandsError: as `replay`.
+    """
     if jobs == 1:
-        return _replay_all(directory, engine, drawn)
-    shares = [drawn[k::jobs] for k in range(min(jobs, n))]
+        return _replay_all(directory, engine, perturbations)
+    shares = [perturbations[k::jobs] for k in range(min(jobs, len(perturbations)))]
     # Forking a process that runs threads (a progress display, a solver) can hang it.
     with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
         played = list(pool.map(partial(_replay_all, directory, engine), shares))
-    return [played[k % jobs][k // jobs] for k in range(n)]
+    return [played[k % jobs][k // jobs] for k in range(len(perturbations))]
 
 
 def _replay_all(directory: str | Path, engine: str, perturbations: Sequence[Perturbation]) -> list[Replay]:
@@ -165,6 +181,11 @@ ENGINES: dict[str, Callable[[Folder, Perturbation], World]] = {"mujoco": Simulat
 """Physics engines by name."""
 
 
+def can_play(engine: str, perturbation: Perturbation) -> bool:
+    """Return whether an engine can be told of all that is different from the plan."""
+    return engine != "drake" or perturbation.torsion == 1.0
+
+
 class Player:
     """A result folder and, once it has been played, its plan, which no perturbation changes.
 
@@ -190,9 +211,10 @@ class Player:
         scene.settle(plan, observer)
         positions, quaternions = np.empty((len(plan), 3)), np.empty((len(plan), 4))
         positions[0], quaternions[0] = scene.object_pose()
+        push, nothing = np.asarray(perturbation.push), np.zeros(3)
         for i in range(len(plan) - 1):
             pushed = perturbation.push_start <= i * scene.step < perturbation.push_end
-            scene.play(plan, i, np.asarray(perturbation.push) if pushed else np.zeros(3), observer)
+            scene.play(plan, i, push if pushed else nothing, observer)
             positions[i + 1], quaternions[i + 1] = scene.object_pose()
             if plan.distance(i + 1, positions[i + 1]) > GONE * folder.length:
                 positions[i + 2 :], quaternions[i + 2 :] = positions[i + 1], quaternions[i + 1]

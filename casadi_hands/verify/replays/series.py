@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -11,13 +11,16 @@ from typing import Any
 import numpy as np
 
 from casadi_hands.task import Task
-from casadi_hands.verify.replays.perturb import Perturbation, draw_perturbation
-from casadi_hands.verify.replays.replay import Player, Replay, replay_many
+from casadi_hands.verify.replays.perturb import Perturbation, suite
+from casadi_hands.verify.replays.replay import Player, Replay, can_play, replay_each
 from casadi_hands.verify.replays.simulation import RELEASE, SQUEEZE
 from casadi_hands.verify.report import Figure
 
-REPLAYS = 12
-"""Perturbed replays of a design."""
+TOGETHER = 4
+"""Replays of a design with everything perturbed at once, beside those with one thing at a time."""
+
+NAMED = 3
+"""Replays that a figure names, at most."""
 
 ENOUGH_STEPS = 100_000
 """Steps of a simulation that are worth starting processes for."""
@@ -35,7 +38,7 @@ class Replays:
         step: of the simulation, s.
         seed: of the perturbations.
         nominal: with nothing perturbed.
-        perturbed: each in its own way, as `draw_perturbation` numbers them.
+        perturbed: by the names that `suite` gives them.
     """
 
     engine: str
@@ -43,12 +46,17 @@ class Replays:
     step: float
     seed: int
     nominal: Replay
-    perturbed: tuple[Replay, ...]
+    perturbed: Mapping[str, Replay]
 
     @property
     def drops(self) -> int:
         """How many of the perturbed replays drop the object; all of them where even the nominal one does."""
-        return len(self.perturbed) if self.nominal.dropped else sum(each.dropped for each in self.perturbed)
+        return len(self.perturbed) if self.nominal.dropped else len(self.dropping)
+
+    @property
+    def dropping(self) -> tuple[str, ...]:
+        """Names of the perturbed replays that drop the object."""
+        return tuple(name for name, each in self.perturbed.items() if each.dropped)
 
     def figures(self, task: Task | None = None) -> list[Figure]:
         """The certificate's figures: error at the goals as planned, and the share of perturbed replays that drop.
@@ -80,7 +88,9 @@ class Replays:
     def _dropped(self, engine: str, limit: float) -> Figure:
         if self.nominal.dropped:
             return Figure("replay_dropped", 1.0, limit, "share", f"in {engine} the object is dropped as planned")
-        found = f"in {engine} {self.drops} of {len(self.perturbed)} perturbed replays drop the object, {{value}}"
+        which = ", ".join([*self.dropping[:NAMED], *(["…"] if self.drops > NAMED else [])])
+        which = f" ({which})" if which else ""
+        found = f"in {engine} {self.drops} of {len(self.perturbed)} perturbed replays drop the object{which}, {{value}}"
         return Figure("replay_dropped", self.drops / len(self.perturbed), limit, "share", found)
 
     def dropped_before(self, task: Task | None = None) -> str | None:
@@ -107,20 +117,21 @@ class Replays:
                 "timestep": self.step,
                 "settle": SQUEEZE + RELEASE,
                 "seed": self.seed,
+                "suite": {name: each.perturbation.changes for name, each in self.perturbed.items()},
             },
             "goals": [{"mm": 1e3 * goal.position, "degrees": goal.angle} for goal in self.nominal.goals],
             "mean": _pair(self.nominal.position_mean, self.nominal.angle_mean),
             "largest": _pair(self.nominal.position_max, self.nominal.angle_max),
             "dropped_as_planned": self.nominal.dropped,
-            "dropped": sum(each.dropped for each in self.perturbed),
+            "dropped": len(self.dropping),
             "of": len(self.perturbed),
             "perturbed": {
-                f"everything at once, number {number}": {
+                name: {
                     "mean": _pair(each.position_mean, each.angle_mean),
                     "largest": _pair(each.position_max, each.angle_max),
                     "dropped": each.dropped,
                 }
-                for number, each in enumerate(self.perturbed)
+                for name, each in self.perturbed.items()
             },
         }
 
@@ -130,13 +141,13 @@ def _pair(position: float, angle: float) -> dict[str, float]:
 
 
 def run_replays(
-    directory: str | Path, count: int = REPLAYS, seed: int = 0, jobs: int = 1, engine: str = "mujoco"
+    directory: str | Path, count: int = TOGETHER, seed: int = 0, jobs: int = 1, engine: str = "mujoco"
 ) -> Replays:
     """Play a result folder as planned and perturbed.
 
     Args:
         directory: the result folder.
-        count: perturbed replays.
+        count: replays with everything perturbed at once, beside those with one thing at a time; 0 for neither.
         seed: of the perturbations.
         jobs: processes to use at most; the outcome does not depend on it.
         engine: one of ``replay.ENGINES``.
@@ -148,11 +159,14 @@ def run_replays(
     player = Player(directory, engine)
     nominal = player.play(Perturbation())
     assert player.plan is not None
-    if jobs > 1 and count * len(player.plan) > ENOUGH_STEPS:
-        perturbed = replay_many(directory, count, seed, jobs, engine)
+    tried = suite(player.folder, seed, count) if count else {}
+    tried = {name: each for name, each in tried.items() if can_play(engine, each)}
+    if jobs > 1 and len(tried) * len(player.plan) > ENOUGH_STEPS:
+        played = replay_each(directory, list(tried.values()), jobs, engine)
     else:
-        perturbed = [player.play(draw_perturbation(player.folder, seed, number)) for number in range(count)]
-    return Replays(engine, player.folder.task, float(player.plan.time[1]), seed, nominal, tuple(perturbed))
+        played = [player.play(each) for each in tried.values()]
+    perturbed = dict(zip(tried, played, strict=True))
+    return Replays(engine, player.folder.task, float(player.plan.time[1]), seed, nominal, perturbed)
 
 
 def stronger_motors(directory: str | Path) -> Iterator[tuple[Perturbation, Replays]]:
@@ -169,7 +183,7 @@ def stronger_motors(directory: str | Path) -> Iterator[tuple[Perturbation, Repla
     def played_with(change: Perturbation) -> tuple[Perturbation, Replays]:
         seen = player.play(change)
         assert player.plan is not None
-        return change, Replays("mujoco", player.folder.task, float(player.plan.time[1]), 0, seen, ())
+        return change, Replays("mujoco", player.folder.task, float(player.plan.time[1]), 0, seen, {})
 
     for factor in (1.5, 2.0, 3.0, 4.0, 6.0, 8.0):
         yield played_with(Perturbation(effort=factor, squeeze=factor))

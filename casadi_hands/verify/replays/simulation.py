@@ -100,7 +100,8 @@ class Plan:
 
     def distance(self, i: int, position: np.ndarray) -> float:
         """Return how far (m) a position (3,), world, is from the object's plan at a step."""
-        return float(np.linalg.norm(position - self._object_position[i]))
+        away = position - self._object_position[i]
+        return float(np.sqrt(away @ away))
 
     def errors(self, positions: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return distance (m) and angle (deg) of the object's poses, (T, 3) and (T, 4), from its plan.
@@ -144,19 +145,13 @@ class Simulation:
             raise DesignError(f"{file}: {error}") from None
         self._find(folder, file)
         self._bias = np.asarray(perturbation.joint_bias or np.zeros(len(folder.motion.joint_names)))
-        self._displaced, self._ahead = perturbation.displaced, perturbation.squeeze / perturbation.stiffness
-        driven = self._actuators
-        self.model.actuator_gainprm[driven, 0] *= perturbation.stiffness
-        self.model.actuator_biasprm[driven, 1] *= perturbation.stiffness
-        self.model.actuator_biasprm[driven, 2] *= np.sqrt(perturbation.stiffness)
-        self.model.actuator_forcerange[driven] *= perturbation.effort
-        self.model.body_mass[self._object] *= perturbation.mass
-        self.model.body_inertia[self._object] *= perturbation.mass
-        self.model.geom_friction *= perturbation.friction
+        self._displaced, self._harder = perturbation.displaced, perturbation.squeeze / perturbation.stiffness
+        self._perturb(perturbation)
         self.data = mujoco.MjData(self.model)
         mujoco.mj_setConst(self.model, self.data)
         self._place(folder, perturbation)
         self.step = float(self.model.opt.timestep)
+        self._late = round(perturbation.delay / self.step)
 
     def _find(self, folder: Folder, file: Path) -> None:
         """Look up by name what the replay touches."""
@@ -171,10 +166,27 @@ class Simulation:
         driven = model.actuator_trnid[:, 0].tolist()
         if self._object < 0 or -1 in self._links.values() or any(joint not in driven for joint in joints):
             raise DesignError(f"{file}: it lacks the object, a link, a joint or an actuator of this hand")
-        self._actuators = [driven.index(joint) for joint in joints]
+        self._actuators = np.array([driven.index(joint) for joint in joints], dtype=int)
         self._angles = [int(model.jnt_qposadr[joint]) for joint in joints]
         free = int(model.body_jntadr[self._object])
         self._pose, self._twist = int(model.jnt_qposadr[free]), int(model.jnt_dofadr[free])
+
+    def _perturb(self, perturbation: Perturbation) -> None:
+        """Change the model as the perturbation says."""
+        model, driven = self.model, self._actuators
+        model.actuator_gainprm[driven, 0] *= perturbation.stiffness
+        model.actuator_biasprm[driven, 1] *= perturbation.stiffness
+        model.actuator_biasprm[driven, 2] *= np.sqrt(perturbation.stiffness)
+        model.actuator_forcerange[driven] *= perturbation.effort
+        model.body_mass[self._object] *= perturbation.mass
+        model.body_inertia[self._object] *= perturbation.mass
+        model.geom_friction *= perturbation.friction
+        model.geom_friction[:, 1] *= perturbation.torsion
+        links = [body for name, body in self._links.items() if name not in ("palm", "ground")]
+        model.body_mass[links] *= perturbation.link_mass
+        model.body_inertia[links] *= perturbation.link_mass
+        # What MuJoCo takes off a body is a share of its actual weight, and the hand knows the planned one.
+        model.body_gravcomp[links] /= perturbation.link_mass
 
     def _place(self, folder: Folder, perturbation: Perturbation) -> None:
         """Put everything at the motion's first sample, the object off it as the perturbation says."""
@@ -206,6 +218,9 @@ class Simulation:
 
     def settle(self, plan: Plan, observer: Observer | None) -> None:
         """Squeeze at the start pose; an object off its place is held there by a soft support, which then lets go."""
+        told = np.maximum(np.arange(len(plan)) - self._late, 0)
+        ahead = self._harder * (plan.commands[told] - plan.angles[told])
+        self._set_points = plan.angles[told] + self._bias + ahead  # (T, J) rad
         for i in range(round((SQUEEZE + RELEASE) / self.step)):
             time = i * self.step
             share = 1.0 - max(0.0, time - SQUEEZE) / RELEASE if self._displaced else 0.0
@@ -213,7 +228,7 @@ class Simulation:
             force, torque = self._support(share) if share else (np.zeros(3), np.zeros(3))
             # What the fingers do not bear yet: on its springs alone the object would sag and be gripped there.
             unborne = -(1.0 - squeeze) * self.model.body_mass[self._object] * self.model.opt.gravity
-            self._follow(plan, 0, squeeze)
+            self._follow(plan, 0, self._set_points[0] - (1.0 - squeeze) * ahead[0])
             self._advance(plan.external_force[0] + force + unborne, plan.external_torque[0] + torque, observer)
 
     def _support(self, share: float) -> tuple[np.ndarray, np.ndarray]:
@@ -245,13 +260,12 @@ class Simulation:
 
     def play(self, plan: Plan, i: int, push: np.ndarray, observer: Observer | None) -> None:
         """Drive the hand as planned for a step, and make it; ``push`` (3,) is a force on the object, N, world."""
-        self._follow(plan, i, 1.0)
+        self._follow(plan, i, self._set_points[i])
         self._advance(plan.external_force[i] + push, plan.external_torque[i], observer)
 
-    def _follow(self, plan: Plan, i: int, squeeze: float) -> None:
-        """Set the motors' set points for a step, with a share of what they are ahead of the planned angles."""
-        ahead = squeeze * self._ahead * (plan.commands[i] - plan.angles[i])
-        self.data.ctrl[self._actuators] = plan.angles[i] + self._bias + ahead
+    def _follow(self, plan: Plan, i: int, set_points: np.ndarray) -> None:
+        """Set the motors' set points (J,), rad, and the palm's target for a step."""
+        self.data.ctrl[self._actuators] = set_points
         if self._mocap >= 0:
             self.data.mocap_pos[self._mocap] = plan.palm_position[i]
             self.data.mocap_quat[self._mocap] = plan.palm_quaternion[i]
