@@ -62,6 +62,8 @@ class Model:
         joint_limits: lower and upper, rad.
         torque_limit: of a joint in m·g·length, or inf.
         speed_limit: of a joint in rad/s, or inf.
+        force_limit: of each component of a contact force, object frame, in m·g.
+        clearance: that bodies which do not touch keep from each other, lengths.
         regrasp: planned, or None where fingers stay where they touch.
         own_terms: costs and constraints that a person adds to those of the stages.
     """
@@ -90,6 +92,8 @@ class Model:
     joint_limits: tuple[float, float]
     torque_limit: float
     speed_limit: float
+    force_limit: float
+    clearance: float
     regrasp: Regrasp | None = None
     own_terms: tuple[OwnTerm, ...] = ()
 

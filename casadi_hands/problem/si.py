@@ -17,6 +17,7 @@ from casadi_hands.motion.quaternion import quaternion
 from casadi_hands.problem.contacts import Contact
 from casadi_hands.problem.hand import Finger, Hand, Link
 from casadi_hands.problem.hand_motion import WholeHand
+from casadi_hands.problem.loads import USUAL_FORCE, usual_force_limit
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.motion import Motion
 from casadi_hands.problem.palm_path import PalmPath
@@ -51,7 +52,8 @@ def build_model(task: Task) -> Model:
     palm = palm_path.at(schedule.samples)
     actuator = task.actuator
     low, high = task.hand.joint_limits
-    return Model(
+    given = task.hand.contact_force
+    model = Model(
         units=units,
         schedule=schedule,
         gravity=round_off(np.asarray(task.gravity) / acceleration),
@@ -79,7 +81,10 @@ def build_model(task: Task) -> Model:
         joint_limits=(math.radians(low), math.radians(high)),
         torque_limit=math.inf if actuator is None else round_off(actuator.torque / units.torque),
         speed_limit=math.inf if actuator is None else actuator.speed,
+        force_limit=given or USUAL_FORCE,
+        clearance=round_off(task.hand.clearance / length),
     )
+    return model if given else replace(model, force_limit=usual_force_limit(model))
 
 
 def _contacts(task: Task, bodies: Sequence[Body], length: float) -> tuple[Contact, ...]:

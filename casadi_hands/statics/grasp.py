@@ -15,20 +15,19 @@ def grasp_map(points: Array) -> Array:
     return np.vstack([np.tile(np.eye(3), len(points)), np.hstack([pin.skew(p) for p in points])])
 
 
-def friction_edges(normals: Array, friction: Array) -> Array:
-    """(3, C·edges) unit-normal-force edges of the linearised friction cones, inscribed."""
+def friction_edges(normals: Array, friction: Array, count: int = EDGES) -> Array:
+    """(3, C·count) unit-normal-force edges of the linearised friction cones, inscribed."""
     across = np.cross(normals, np.eye(3)[np.argmin(np.abs(normals), axis=1)])
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     other = np.cross(normals, across)
-    angles = np.linspace(0, 2 * np.pi, EDGES, endpoint=False)[:, None]
+    angles = np.linspace(0, 2 * np.pi, count, endpoint=False)[:, None]
     sideways = np.cos(angles) * across[:, None] + np.sin(angles) * other[:, None]
     edges: Array = (normals[:, None] + friction[:, None, None] * sideways).reshape(-1, 3).T
     return edges
 
 
-def spread_forces(normals: Array, friction: Array) -> Array:
-    """(3C, 8C): contact forces one above the other for each edge of the friction cones about normals (C, 3)."""
-    edges = friction_edges(normals, friction)
-    count = edges.shape[1] // len(normals)
+def spread_forces(normals: Array, friction: Array, count: int = EDGES) -> Array:
+    """(3C, C·count): contact forces one above the other for each edge of the friction cones about normals (C, 3)."""
+    edges = friction_edges(normals, friction, count)
     mask = np.kron(np.eye(len(normals)), np.ones((3, count)))
     return np.asarray(np.tile(edges, (len(normals), 1)) * mask)

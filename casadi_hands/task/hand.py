@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field, field_validator
 
-from casadi_hands.task.fields import Number, Pair, Positive, Section, Vector, refuse
+from casadi_hands.task.fields import NonNegative, Number, Pair, Positive, Section, Vector, refuse
 
 
 class FingerSpec(Section):
@@ -42,6 +42,15 @@ class HandSpec(Section):
     )
     joint_limits: Pair = Field(default=(-90.0, 90.0), description="Lower and upper limit of every joint, degrees.")
     density: Positive = Field(default=1150.0, description="Density of links and palm, kg/m³.")
+    contact_force: Positive | None = Field(
+        default=None,
+        description="Largest component of a contact force along an axis of the object frame, over the object's weight.",
+        json_schema_extra={"default": "20, or where the task's loads need more, 4 times their least"},
+    )
+    clearance: NonNegative = Field(
+        description="Distance that bodies which do not touch keep from each other, m.",
+        json_schema_extra={"default": "0.02 × object's characteristic length"},
+    )
 
     @field_validator("link_length")
     @classmethod

@@ -18,6 +18,7 @@ from casadi_hands.task.search import Search
 from casadi_hands.task.weights import Weights
 
 STANDARD_GRAVITY = 9.81  # m/s²
+USUAL_CLEARANCE = 0.02  # of the characteristic length
 
 
 class Task(Section):
@@ -88,8 +89,9 @@ class Task(Section):
     @field_validator("hand", mode="before")
     @classmethod
     def _hand_defaults(cls, value: Any, info: ValidationInfo) -> Any:
-        palm, fingers, goals = (info.data.get(name) for name in ("palm", "fingers", "motion"))
-        value = fill(value, link_radius=0.13 * palm.radius if palm else 1.0)
+        body, palm, fingers, goals = (info.data.get(name) for name in ("object", "palm", "fingers", "motion"))
+        clearance = USUAL_CLEARANCE * body.characteristic_length if body else 1.0
+        value = fill(value, link_radius=0.13 * palm.radius if palm else 1.0, clearance=clearance)
         if not isinstance(value, dict) or "link_length" in value:
             return value
         length = (1.0, 1.0)

@@ -11,7 +11,7 @@ from casadi_hands.nlp import Problem, Rows
 from casadi_hands.problem.model import Model, sizes
 from casadi_hands.problem.palm_motion import added_to_spline
 from casadi_hands.stages.object_motion import kernels
-from casadi_hands.stages.object_motion.values import MOST_FORCE, least_contacts, pose_bounds
+from casadi_hands.stages.object_motion.values import least_contacts, pose_bounds
 
 Array = NDArray[np.float64]
 
@@ -44,14 +44,14 @@ class ObjectSide:
 
 def declare_object(problem: Problem, model: Model) -> ObjectSide:
     """Declare ``pose`` (N, 6), ``point`` (N, 3C), ``invariant`` (N, C), and each scenario's ``force`` (S, 3C)."""
-    schedule = model.schedule
+    schedule, most = model.schedule, model.force_limit
     keyframes, samples, contacts = sizes(model)
     pose = problem.variable("pose", (keyframes, 6), *pose_bounds(model))
     point = problem.variable("point", (keyframes, 3 * contacts))
-    force = problem.variable("force", (samples, 3 * contacts), -MOST_FORCE, MOST_FORCE)
+    force = problem.variable("force", (samples, 3 * contacts), -most, most)
     invariant = problem.variable("invariant", (keyframes, contacts), 0, 1)
     disturbed = [
-        problem.variable(f"force{each.suffix}", (samples, 3 * contacts), -MOST_FORCE, MOST_FORCE, quantity="force")
+        problem.variable(f"force{each.suffix}", (samples, 3 * contacts), -most, most, quantity="force")
         for each in model.scenarios[1:]
     ]
 

@@ -14,9 +14,7 @@ from casadi_hands.problem.palm_motion import carried_along, carried_by_palm, goa
 from casadi_hands.stages.own_terms import own_values
 
 Array = NDArray[np.float64]
-CLEARANCE = 0.02  # lengths, asked of object and palm, and in exact motions of all bodies that do not touch
 GOAL_TOLERANCE = 5e-4  # lengths and rad, each coordinate: the task's cost alone gives way to slow accelerations
-MOST_FORCE = 20.0  # m·g, a bound on each component of a contact force
 MOST_TURN = 5.6  # rad, up to where the exponential map's coordinates are used
 
 
@@ -76,7 +74,7 @@ def object_parameters(model: Model) -> dict[str, Array | float]:
         "inertia": model.inertia.reshape(1, 9),
         "inertial": model.units.inertial,
         "friction": model.friction,
-        "clearance": CLEARANCE,
+        "clearance": model.clearance,
         "ground_height": model.ground_height,
         "patches": model.keyframe_patches[model.schedule.sample_keyframes].reshape(sizes(model)[1], -1),
         "palm_position": model.palm_position,

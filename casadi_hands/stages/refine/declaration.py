@@ -14,7 +14,6 @@ from casadi_hands.nlp import Kernel, Parameter, Problem, Rows
 from casadi_hands.nlp.arguments import Argument
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.structure import Structure
-from casadi_hands.stages.object_motion.values import MOST_FORCE
 from casadi_hands.stages.synthesis.stage import AXIS_RANGE
 
 JOINT_MARGIN = 0.005  # rad, so that a smooth curve through the knots stays within the limits between them
@@ -61,16 +60,16 @@ class Declaration:
 
     def _declare_variables(self) -> None:
         problem, structure, model = self.problem, self.structure, self.structure.model
-        count, width = self.knots, 3 * len(structure.columns)
+        count, width, most = self.knots, 3 * len(structure.columns), model.force_limit
         self.pose = problem.variable("pose", (count, 6))
         self.rate = problem.variable("rate", (count, 6))
         self.point = problem.variable("point", (count, width))
-        self.force = problem.variable("force", (count, width), -MOST_FORCE, MOST_FORCE)
+        self.force = problem.variable("force", (count, width), -most, most)
         self.wrench = problem.variable("wrench", (count, 6))
         self.middle_torque = problem.variable("middle_torque", (count - 1, 3))
         if len(self.disturbed):
             shape = (len(self.disturbed), width)
-            self.force_disturbed = problem.variable("force_disturbed", shape, -MOST_FORCE, MOST_FORCE, quantity="force")
+            self.force_disturbed = problem.variable("force_disturbed", shape, -most, most, quantity="force")
         lowest, highest = model.joint_limits
         limits, reach = (lowest + JOINT_MARGIN, highest - JOINT_MARGIN), model.palm_radius
         self.angles: list[Rows] = []

@@ -6,7 +6,6 @@ import numpy as np
 
 from casadi_hands.kinematics.singularity import MARGIN_SIZES
 from casadi_hands.nlp import Parameter, Rows
-from casadi_hands.stages.object_motion.values import CLEARANCE
 from casadi_hands.stages.refine import finger_kernels as kernels
 from casadi_hands.stages.refine.declaration import FREE, IN_CONE, Bounds, Declaration, Knots
 
@@ -139,7 +138,7 @@ def bind_clearance(of: Declaration, i: int) -> None:
         knots = np.flatnonzero(where)
         if len(knots):
             moving = {"pose": of.pose.take(knots), "angles": of.angles[i].take(knots)}
-            bind(kind, knots, moving, of.at(knots, "palm_position", "palm_quaternion"), CLEARANCE, skipped)
+            bind(kind, knots, moving, of.at(knots, "palm_position", "palm_quaternion"), model.clearance, skipped)
     if len(idle):  # a lifted finger is quick, and must not cut through the object's edge between two knots
         halves = structure.middles.weights(idle)
         moving = {"pose": of.pose.combine(halves), "angles": of.angles[i].combine(halves)}
@@ -184,7 +183,7 @@ def bind_pair(of: Declaration, i: int, j: int, guarded: bool) -> None:
             radius=of.problem["radius"],
         )
 
-    bind("fingers_apart", np.arange(of.knots), [of.angles[k] for k in (i, j)], CLEARANCE)
+    bind("fingers_apart", np.arange(of.knots), [of.angles[k] for k in (i, j)], structure.model.clearance)
     if guarded:
         inner = structure.inner
         bind("fingers_between", inner.interval, [of.angles[k].combine(inner.weights()) for k in (i, j)], 0.0)

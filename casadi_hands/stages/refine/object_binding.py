@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from casadi_hands.problem.palm_motion import carried_velocity
-from casadi_hands.stages.object_motion.values import CLEARANCE, GOAL_TOLERANCE
+from casadi_hands.stages.object_motion.values import GOAL_TOLERANCE
 from casadi_hands.stages.refine import object_kernels as kernels
 from casadi_hands.stages.refine.declaration import FREE, IN_CONE, Declaration
 
@@ -63,7 +63,7 @@ def bind_object(of: Declaration) -> None:
     of.bind(
         every,
         kernels.object_apart(model.kinds, model.ground is not None),
-        {"palm": (CLEARANCE, np.inf), "ground": (-GOAL_TOLERANCE, np.inf)},
+        {"palm": (model.clearance, np.inf), "ground": (-GOAL_TOLERANCE, np.inf)},
         pose=of.pose,
         **of.at(every, "reference", "palm_position", "palm_quaternion", "palm_radius", "ground_height", "bodies"),
     )

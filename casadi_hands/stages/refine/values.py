@@ -13,7 +13,7 @@ from casadi_hands.motion import continuous
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.placement import contact_jacobians
-from casadi_hands.stages.object_motion.values import MOST_FORCE, MOST_TURN, tool_path
+from casadi_hands.stages.object_motion.values import MOST_TURN, tool_path
 from casadi_hands.stages.own_terms import own_values
 from casadi_hands.stages.refine.initial_guess import balanced, disturbance_wrenches, rates_and_wrenches
 from casadi_hands.stages.refine.problem import RefineProblem
@@ -119,7 +119,8 @@ class RefineValues:
             low_pose[at], high_pose[at] = goals - tolerance, goals + tolerance
         rate = np.full((count, 6), np.inf)
         rate[[0, -1]] = 0.0
-        bearing, active = (np.repeat(np.where(f, MOST_FORCE, 0.0), 3, axis=1) for f in (self.bearing, self._active))
+        most = model.force_limit
+        bearing, active = (np.repeat(np.where(f, most, 0.0), 3, axis=1) for f in (self.bearing, self._active))
         upper = {"rate": rate, "force": bearing}
         if len(self.disturbed):
             # A disturbance may begin with a touch, and what resists it is no force that has to grow.

@@ -1,0 +1,105 @@
+"""What the loads of a task ask of the contacts at least, before any motion is known: statics at its samples.
+
+The object stands on the straight way between the goals, the contacts are where the task puts them, and friction's cones
+are circumscribed: the least is a little less than what any motion needs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from casadi_hands.geometry.contact_points import inward_normals
+from casadi_hands.motion import linear
+from casadi_hands.problem.model import Model
+from casadi_hands.statics.grasp import grasp_map, spread_forces
+from casadi_hands.statics.programmes import least_largest_solution, nonnegative_fit
+
+Array = NDArray[np.float64]
+HELD = 0.05  # m·g and m·g·length of missing wrench, that the floating stage lets pass too
+USUAL_FORCE = 20.0  # m·g
+_ROOM = 4.0  # of the usual limit over the least: half for friction's margin, half for a squeeze
+_EDGES = 32  # of a circumscribed cone, which is wider than friction by 0.5 % at most
+_NEAR = 0.1  # lengths above the ground, within which it may still carry
+
+
+@dataclass(frozen=True)
+class Load:
+    """What acts on the object at a time, and what the contacts must bear for it.
+
+    Attributes:
+        time: s.
+        force: (3,) m·g, world, that acts besides gravity.
+        torque: (3,) m·g·length, world.
+        contact: index of the one that bears the largest component of a force.
+        least: the least that this component can be, m·g.
+    """
+
+    time: float
+    force: Array
+    torque: Array
+    contact: int
+    least: float
+
+
+def hardest_load(model: Model, enough: float) -> Load | None:
+    """The load for which the largest component of a contact force, in the object's frame, must be largest.
+
+    Loads that the contacts cannot bear however they press, where the task puts them, are left out: another place may.
+
+    Args:
+        model: the task.
+        enough: m·g; what can be borne with this is not looked at any closer.
+
+    Returns:
+        The load; None if ``enough`` is enough.
+    """
+    hardest = None
+    for time, force, torque, forces, wrenches, needed in _balances(model):
+        edges, missing = nonnegative_fit(wrenches, needed)
+        if missing > HELD or np.abs(forces @ edges).max() <= enough:
+            continue
+        least = least_largest_solution(forces, wrenches, wrenches @ edges)
+        borne = np.abs(forces @ (edges if least is None else least))
+        if borne.max() > max(enough, hardest.least if hardest else 0.0):
+            hardest = Load(time, force, torque, int(borne.argmax()) // 3, float(borne.max()))
+    return hardest
+
+
+def usual_force_limit(model: Model) -> float:
+    """Limit of a contact force's components, m·g, for a task that gives none; in whole weights."""
+    load = hardest_load(model, USUAL_FORCE / _ROOM)
+    return USUAL_FORCE if load is None else float(math.ceil(_ROOM * load.least - 1e-6))
+
+
+def _balances(model: Model) -> Iterator[tuple[float, Array, Array, Array, Array, Array]]:
+    """Time, force and torque from outside, forces and wrenches by edge, and the wrench that contacts must make.
+
+    Forces (3C, E), wrenches (6, E) and the wrench (6,) in the object's frame; what comes twice is given once.
+    """
+    schedule, points, seen = model.schedule, model.patches, set()
+    ways = linear(schedule.keyframes[list(schedule.goals)], schedule.samples)
+    normals, friction = inward_normals(points, model.touched), model.frictions / math.cos(math.pi / _EDGES)
+    reference = pin.Quaternion(*model.reference).matrix()
+    for scenario in model.scenarios:
+        for k, way in enumerate(ways):
+            turn = pin.exp3(way @ model.goal_vectors) @ reference
+            force, torque = scenario.force[k], scenario.torque[k]
+            needed = -np.concatenate([turn.T @ (model.gravity + force), turn.T @ torque])
+            place = way @ model.goal_positions - (0.0 if model.tool is None else turn @ model.tool)
+            grounded = model.ground is not None and bool((place + turn @ points[-1])[2] <= model.ground + _NEAR)
+            # The ground's own normal, and how the object stands on it, change with the turn.
+            key = (*np.round(needed, 9), *(np.round(turn[2], 9) if grounded else ()))
+            if key in seen:
+                continue
+            seen.add(key)
+            normals[model.contacts :] = turn[2]
+            count = model.contacts + grounded
+            forces = spread_forces(normals[:count], friction[:count], _EDGES)
+            wrenches = grasp_map(points[:count]) @ forces
+            yield float(schedule.samples[k]), force, torque, forces, wrenches, needed
