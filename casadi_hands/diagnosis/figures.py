@@ -6,12 +6,13 @@ import re
 
 import numpy as np
 
-from casadi_hands.diagnosis.holding import HELD, MOST_NORMAL_FORCE, holdings, least_friction, least_torque
+from casadi_hands.diagnosis.holding import firmest, holdings, least_friction, least_torque
 from casadi_hands.diagnosis.moment import moment
 from casadi_hands.diagnosis.reason import Reason
 from casadi_hands.diagnosis.shortcoming import WITHOUT_CONTACT
 from casadi_hands.problem.floating_motion import Floating
 from casadi_hands.problem.hand import Hand
+from casadi_hands.problem.loads import HELD
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.motors import joint_motors
 from casadi_hands.problem.result import Result
@@ -39,7 +40,7 @@ def friction_reason(model: Model, floating: Floating) -> Reason | None:
     else:
         k = int(np.argmax([holding.hardest for holding in found]))
         worst, when = found[k], moment(model.schedule, model.schedule.keyframes[k])
-        if worst.hardest <= MOST_NORMAL_FORCE:
+        if worst.hardest <= firmest(model):
             return None
         what = (
             f"at {when} the contacts hold the object with friction {model.friction:g} only if they press with "
@@ -50,7 +51,7 @@ def friction_reason(model: Model, floating: Floating) -> Reason | None:
     advice = (
         contacts
         if least is None
-        else f"friction of {least:.2g} or more, with which {MOST_NORMAL_FORCE:g} weights would do, or {contacts}"
+        else f"friction of {least:.2g} or more, with which {firmest(model):.3g} weights would do, or {contacts}"
     )
     return Reason(what, advice, _HOLDING, root=True)
 

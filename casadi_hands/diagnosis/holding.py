@@ -6,7 +6,7 @@ is a least-squares fit or a linear programme at each keyframe or sample.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import compress
 
 import casadi as ca
@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 from casadi_hands.geometry.contact_points import inward_normals
 from casadi_hands.kinematics import finger_kinematics
 from casadi_hands.problem.floating_motion import Floating
+from casadi_hands.problem.loads import HELD, hardest_load
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.result import Result
 from casadi_hands.stages.floating.gate import needed_wrenches
@@ -26,7 +27,6 @@ from casadi_hands.statics.programmes import least_largest, least_largest_solutio
 from casadi_hands.terms.finger import NULL_SPACE_DAMPING
 
 Array = NDArray[np.float64]
-HELD = 0.05  # m·g and m·g·length of missing wrench, that the floating stage lets pass too
 MOST_NORMAL_FORCE = (
     2.0  # m·g, the firmest holding that a refinement asks for; where more is needed, friction is too low
 )
@@ -78,16 +78,24 @@ def holdings(model: Model, floating: Floating, friction: float | None = None) ->
     return tuple(found)
 
 
+def firmest(model: Model) -> float:
+    """The normal force, m·g, beyond which holding the object is hard, beside what the task's disturbances ask for."""
+    still, pushed = (
+        0.0 if load is None else load.least
+        for load in (hardest_load(each, 0.0) for each in (replace(model, scenarios=model.scenarios[:1]), model))
+    )
+    return max(MOST_NORMAL_FORCE, pushed - still) if model.disturbance else MOST_NORMAL_FORCE
+
+
 def least_friction(model: Model, floating: Floating) -> float | None:
-    """The least friction with which the contacts hold the object at all keyframes, within ``MOST_NORMAL_FORCE``.
+    """The least friction with which the contacts hold the object at all keyframes, within ``firmest``.
 
     Found by bisection, to a hundredth of itself; None if no friction up to ``MOST_FRICTION`` would do.
     """
+    most = firmest(model)
 
     def enough(friction: float) -> bool:
-        return all(
-            holding.held and holding.hardest <= MOST_NORMAL_FORCE for holding in holdings(model, floating, friction)
-        )
+        return all(holding.held and holding.hardest <= most for holding in holdings(model, floating, friction))
 
     low, high = 0.0, MOST_FRICTION
     if not enough(high):

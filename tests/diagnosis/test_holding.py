@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from casadi_hands.diagnosis.holding import HELD, MOST_NORMAL_FORCE, holdings, least_friction, least_torque
+from casadi_hands.diagnosis.holding import MOST_NORMAL_FORCE, holdings, least_friction, least_torque
 from casadi_hands.export.design import Design
 from casadi_hands.problem.floating_motion import Floating
 from casadi_hands.problem.hand import Finger, Hand, Link
+from casadi_hands.problem.loads import HELD
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.motion import Motion
 from casadi_hands.problem.si import build_model
