@@ -175,11 +175,13 @@ def formulate(
 
 @app.command()
 def check(task: TaskFile) -> None:
-    """Check a task file and print how it is understood; solves nothing."""
-    from casadi_hands.cli.task_summary import task_summary
+    """Check a task file and print how it is understood; solves nothing. Exits 1 where no hand can do the task."""
+    from casadi_hands.cli.task_summary import check_summary
     from casadi_hands.task import load_task
 
-    Console().print(task_summary(load_task(task)))
+    text, possible = check_summary(load_task(task))
+    Console().print(text)
+    raise typer.Exit(0 if possible else 1)
 
 
 @app.command()

@@ -10,25 +10,34 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from casadi_hands.diagnosis.impossible import impossibilities
+from casadi_hands.problem.si import build_model
 from casadi_hands.task import Goal, Limits, Task
 from casadi_hands.task.limits import usual_replay_position
 
 
-def task_summary(task: Task) -> RenderableType:
-    """What `check` prints: every quantity with its unit, lengths in mm, defaults filled in."""
+def check_summary(task: Task) -> tuple[RenderableType, bool]:
+    """What `check` prints: every quantity with its unit, lengths in mm, defaults filled in; and why no hand can do it.
+
+    The second says whether one might.
+    """
+    model = build_model(task)
     table = Table.grid(padding=(0, 2))
-    for name, text in _lines(task):
+    for name, text in _lines(task, model.force_limit):
         table.add_row(Text(name, style="bold"), Text(text))
     title = Text.assemble((task.name, "bold"), f": {' '.join(task.about.split())}" if task.about else "")
-    return Group(title, table)
+    never = [Text(f"no hand can do this: {reason.text}") for reason in impossibilities(task, model)]
+    return Group(title, table, *never), not never
 
 
-def _lines(task: Task) -> Iterator[tuple[str, str]]:
+def _lines(task: Task, force_limit: float) -> Iterator[tuple[str, str]]:
     yield "object", _object(task)
     yield "", f"inertia, principal: {_numbers(np.linalg.eigvalsh(np.array(task.object.inertia)))} kg·m²"
     yield "palm", _palm(task)
     for i, (name, finger) in enumerate(task.fingers.items()):
         yield "" if i else "fingers", f"{name} touches the object at {_mm(finger.touches)}"
+    most = f"{force_limit:g} weights ({force_limit * task.force_unit:.3g} N)"
+    yield "", f"contact forces of at most {most} along each axis of the object"
     yield "links", _links(task)
     for i, goal in enumerate(task.motion):
         yield "" if i else "goals", f"{goal.at:g} s: {_goal(goal)}"

@@ -10,6 +10,8 @@ from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
+from casadi_hands.diagnosis.impossible import impossibilities
+from casadi_hands.diagnosis.reason import format_reasons
 from casadi_hands.diagnosis.shortcoming import shortcoming_reason
 from casadi_hands.errors import SolveError
 from casadi_hands.execution.processes import processes, start_up
@@ -61,7 +63,8 @@ def solve(
 
     Returns:
         The design; its status is earned by the audit of what is written. Where a solver breaks off on the way, it is
-        the best one so far, or what there is of it as failed.
+        the best one so far, or what there is of it as failed. Where the task alone shows that no hand can do it, it is
+        failed at once.
 
     Raises:
         SolveError: ``until`` is not a stage, or not the last where there is a start; or the start is of a task of
@@ -76,11 +79,14 @@ def solve(
     if seed is not None:
         task = task.model_copy(update={"search": task.search.model_copy(update={"seed": seed})})
     own_terms = checked(terms)
-    try_out(replace(build_model(task), own_terms=own_terms), task.search.max_joints)
+    model = replace(build_model(task), own_terms=own_terms)
+    try_out(model, task.search.max_joints)
     if until in STAGES[2:]:
         load_mujoco()  # before hours of work, not after them
     jobs = jobs or os.cpu_count() or 1
     record = Record(task, out, progress or (lambda _: None), own_terms)
+    if never := impossibilities(task, model):
+        return record.keep(replace(record.design, reason=format_reasons(never)))
     with processes(jobs) if executor is None else nullcontext(executor) as workers:
         try:
             design = None if start is None else _refine_again(record, start)

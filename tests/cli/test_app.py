@@ -156,6 +156,25 @@ def test_check_says_how_a_task_is_understood() -> None:
     assert text.count(" s: [") == len(task.motion)
 
 
+def test_check_says_how_hard_contacts_may_press() -> None:
+    text = " ".join(run("check", PROBLEMS / "pill_turn.yaml").output.split())
+    weight = load_task(PROBLEMS / "pill_turn.yaml").force_unit
+    assert f"contact forces of at most 20 weights ({20 * weight:.3g} N) along each axis of the object" in text
+
+
+@pytest.mark.parametrize("command", [("check",), ("solve", "--jobs", "1", "--out", "out")])
+def test_what_no_hand_can_do_is_told_at_once_and_exits_1(
+    command: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "away.yaml"
+    text = (PROBLEMS / "pill_turn.yaml").read_text()
+    path.write_text(text.replace("facing: [0, 0, -1]", "facing: [0, 0, 1]"))
+    found = run(command[0], path, *command[1:])
+    assert found.exit_code == 1
+    assert "the object is behind the palm at every goal" in " ".join(found.output.split())
+
+
 def test_check_prints_lengths_in_mm_and_principal_inertia(tmp_path: Path) -> None:
     path = tmp_path / "ball.yaml"
     path.write_text(

@@ -53,6 +53,16 @@ def never(*_: Any) -> Design:
     raise AssertionError("not asked for")
 
 
+def test_what_no_hand_can_do_fails_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run, "_run", never)
+    task = ball_task()
+    palm = task.palm.model_copy(update={"facing": tuple(-value for value in task.palm.facing)})
+    design = solve(task.model_copy(update={"palm": palm}), jobs=1, out=tmp_path)
+    assert design.status == "failed"
+    assert design.reason.startswith("the object is behind the palm at every goal")
+    assert Design.load(tmp_path).reason == design.reason
+
+
 def test_a_certified_refinement_of_the_earlier_hand_is_the_result(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

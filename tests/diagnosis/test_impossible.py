@@ -1,0 +1,119 @@
+"""What is refused before anything is solved, at the number at which it becomes impossible and just short of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from casadi_hands.diagnosis.impossible import impossibilities
+from casadi_hands.problem.si import build_model
+from casadi_hands.task import load_task, parse_task
+
+PROBLEMS = sorted((Path(__file__).parents[2] / "problems").glob("*.yaml"))
+WEIGHT = 0.1 * 9.81
+
+
+def told(
+    palm: str = "position: [0, 0, 0.3], facing: [0, 0, -1]",
+    motion: str = "[{at: 0, position: [0, 0, 0.2]}, {at: 2, position: [0, 0, 0.19]}]",
+    more: str = "",
+) -> list[str]:
+    """What is impossible about a ball of 3 cm radius between two fingers, below a palm of 4 cm radius."""
+    task = parse_task(
+        f"""
+object: {{mass: 0.1, shapes: [{{sphere: {{center: [0, 0, 0], radius: 0.03}}}}]}}
+palm: {{radius: 0.04, {palm}}}
+motion: {motion}
+fingers: {{left: {{touches: [0, -0.03, 0]}}, right: {{touches: [0, 0.03, 0]}}}}
+{more}
+"""
+    )
+    return [reason.text for reason in impossibilities(task, build_model(task))]
+
+
+@pytest.mark.parametrize("path", PROBLEMS, ids=lambda path: path.stem)
+def test_what_can_be_done_is_not_refused(path: Path) -> None:
+    task = load_task(path)
+    assert impossibilities(task, build_model(task)) == []
+
+
+def test_an_object_behind_the_palm() -> None:
+    (text,) = told("position: [0, 0, 0.3], facing: [0, 0, 1]")
+    assert text.startswith("the object is behind the palm at every goal, by 70 mm or more: fingers point to [0, 0, 1]")
+    assert text.endswith("try palm.facing [0, 0, -1]")
+
+
+def test_an_object_of_which_a_part_is_before_the_palm_or_comes_before_it_is_not_behind() -> None:
+    beside = "[{at: 0, position: [0.2, 0, 0.271]}, {at: 2, position: [0.2, 0, 0.271]}]"
+    assert told("position: [0, 0, 0.3], facing: [0, 0, 1]", beside) == []
+    passing = "[{at: 0, position: [0.2, 0, 0.2]}, {at: 2, position: [0.2, 0, 0.32]}]"
+    assert told("position: [0, 0, 0.3], facing: [0, 0, 1]", passing) == []
+
+
+def test_a_palm_that_may_move_is_not_judged_by_where_it_starts() -> None:
+    assert told("position: [0, 0, 0.3], facing: [0, 0, 1], moves: true") == []
+    assert told("position: [0, 0, 3], facing: [0, 0, -1], moves: true", more="hand: {link_length: [0.02, 0.1]}") == []
+
+
+@pytest.mark.parametrize(("longest", "reaches"), [(0.1, False), (0.101, True)])
+def test_an_object_beyond_the_longest_finger(longest: float, reaches: bool) -> None:
+    # Palm 0.04 and two links of 0.1 and a tip of 0.01 reach 0.25; the ball's near side is 0.251 away at goal 2.
+    motion = "[{at: 0, position: [0, 0, 0.2]}, {at: 2, position: [0, 0, 0.119]}]"
+    hand = f"hand: {{link_length: [0.02, {longest}], link_radius: 0.01}}\nsearch: {{max_joints: 2}}"
+    texts = told("position: [0, 0, 0.4], facing: [0, 0, -1]", motion, hand)
+    if reaches:
+        assert texts == []
+    else:
+        assert texts[0].startswith("the object is out of reach at goal 2 (2 s): it is 251 mm from the palm's centre")
+        assert "2 links of at most 100 mm each, on the palm's rim, reaches 250 mm; try" in texts[0]
+
+
+def test_a_palm_that_follows_its_object_reaches_it() -> None:
+    motion = "[{at: 0, position: [0, 0, 0.2]}, {at: 2, position: [1, 0, 0.2]}]"
+    short = "hand: {link_length: [0.02, 0.1]}"
+    follows = "position: [0, 0, 0.3], facing: [0, 0, -1], motion: [{at: 2, position: [1, 0, 0.3]}]"
+    assert "out of reach at goal 2" in told(motion=motion, more=short)[0]
+    assert told(follows, motion, short) == []
+
+
+def drawing(distance: float, facing: int) -> list[str]:
+    """A drawing whose tool is 0.1 m off the ball's centre, at a distance below the palm."""
+    return told(
+        f"position: [0, 0, {distance}], facing: [0, 0, {facing}]",
+        "[{at: 0, tool_at: [0, 0, 0]}, {at: 2, tool_at: [0.01, 0, 0]}]",
+        "tool: [0, 0, -0.05]\nhand: {link_length: [0.02, 0.1], link_radius: 0.01}\nsearch: {max_joints: 2}",
+    )
+
+
+def test_a_drawing_s_object_may_turn_about_its_tool() -> None:
+    assert drawing(0.3, -1) == []
+    assert "out of reach" in drawing(0.5, -1)[0]
+    assert drawing(0.09, 1) == []
+    assert "behind the palm" in drawing(0.3, 1)[0]
+
+
+@pytest.mark.parametrize(("clearance", "possible"), [(0.0049, True), (0.0061, False)])
+def test_a_goal_nearer_to_the_palm_than_bodies_keep_from_each_other(clearance: float, possible: bool) -> None:
+    # 5 mm, and 0.5 mm of the goal's limit.
+    motion = "[{at: 0, position: [0, 0, 0.2]}, {at: 2, position: [0, 0, 0.265]}]"
+    texts = told(motion=motion, more=f"hand: {{clearance: {clearance}}}")
+    if possible:
+        assert texts == []
+    else:
+        assert texts == [
+            "the object is 5 mm from the palm at goal 2 (2 s), and bodies that do not touch keep 6.1 mm from each "
+            "other (hand.clearance); try a goal farther from the palm, or less hand.clearance"
+        ]
+
+
+def test_a_limit_of_contact_forces_that_the_task_s_torque_exceeds() -> None:
+    # Two contacts, each bears torque / (2 × friction × radius) = 0.6 / (2 · 0.5 · 0.03) = 20 N.
+    push = "gravity: [0, 0, 0]\nperturbations: [{from: 1, to: 1.5, torque: [0, 0, 0.6]}]\n"
+    least = 20 / WEIGHT
+    (text,) = told(more=push + f"hand: {{contact_force: {0.99 * least}}}")
+    assert "must bear at least 20.3 weights (19.9 N) along an axis of the object at 1.05 s (between" in text
+    assert "to withstand the task's torque of 0.6 N·m; hand.contact_force allows 20.2 (19.8 N); try" in text
+    assert "hand.contact_force: 82, its default here" in text
+    assert told(more=push + f"hand: {{contact_force: {1.01 * least}}}") == []
+    assert told(more=push) == []
