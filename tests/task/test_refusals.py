@@ -330,6 +330,32 @@ SPOILT = {
         "at: 2, rotation: {quaternion: [1, 0, 0]},",
         "12: motion[1].rotation.quaternion: given [1, 0, 0]; allowed: a list of 4 numbers",
     ),
+    "quaternion with its real part last": (
+        "at: 2,",
+        "at: 2, rotation: {quaternion: [0, 0, 0.5, 0.866]},",
+        (
+            "12: motion[1].rotation.quaternion: given [0, 0, 0.5, 0.866]; allowed: [w, x, y, z]; is the order of this "
+            "one x, y, z, w, a turn by 60°? Then write [0.866, 0, 0, 0.5]. If 180° are meant: {axis: [0, 0.5, 0.866], "
+            "degrees: 180}"
+        ),
+    ),
+    "lengths in millimetres": (
+        "{start: [0, 0, -0.04], end: [0, 0, 0.04], radius: 0.02}",
+        "{start: [0, 0, -40], end: [0, 0, 40], radius: 20}",
+        # 0.1 kg over π·20²·80 + 4/3·π·20³ = 134041 m³.
+        (
+            "4: object.shapes: given an object 120 m long of 0.1 kg, 7.5e-07 kg/m³; allowed: lengths in m, masses in "
+            "kg, of 0.01 kg/m³ and more; is the file in millimetres (or centimetres)?"
+        ),
+    ),
+    "mass in grams": (
+        "mass: 0.1",
+        "mass: 100",
+        (
+            "3: object.mass: given 100 kg for an object 0.12 m long, 7.5e+05 kg/m³; allowed: masses in kg, of "
+            "200000 kg/m³ and less; is this one in grams?"
+        ),
+    ),
     "angle and quaternion": (
         "at: 2,",
         "at: 2, rotation: {quaternion: [1, 0, 0, 0], degrees: 3},",

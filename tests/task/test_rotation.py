@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from pydantic import ValidationError
 from scipy.spatial.transform import Rotation as ScipyRotation
 
 from casadi_hands.task import Rotation
@@ -19,6 +20,19 @@ def test_quaternion_agrees_with_scipy() -> None:
         expected = ScipyRotation.from_quat([x, y, z, w])
         assert turn.matrix == pytest.approx(expected.as_matrix(), abs=1e-13)
         assert turn.vector == pytest.approx(expected.as_rotvec(), abs=1e-13)
+
+
+@pytest.mark.parametrize("quaternion", [[0, 1, 0, 0], [0, 0, 1, 0], [0, 0.8, 0, 0.6], [0.1, 0, 0, 0.995], [1, 0, 0, 0]])
+def test_half_turns_and_others_are_taken_as_written(quaternion: list[float]) -> None:
+    w, x, y, z = quaternion
+    turn = Rotation.model_validate({"quaternion": [float(value) for value in quaternion]})
+    assert turn.matrix == pytest.approx(ScipyRotation.from_quat([x, y, z, w]).as_matrix(), abs=1e-13)
+
+
+@pytest.mark.parametrize("quaternion", [[0, 0, 0, 1], [0, 0, 0, -2], [0.01, 0.2, 0, 0.98]])
+def test_a_quaternion_that_may_have_its_real_part_last_is_asked_about(quaternion: list[float]) -> None:
+    with pytest.raises(ValidationError, match="is the order of this one x, y, z, w"):
+        Rotation.model_validate({"quaternion": [float(value) for value in quaternion]})
 
 
 def test_no_turn_as_quaternion() -> None:
