@@ -12,6 +12,8 @@ _UNITS = {
     "m": (1000.0, " mm"),
     "deg": (1.0, " deg"),
     "weight": (1.0, " of the weight"),
+    "N·m/rad": (1.0, " N·m/rad"),
+    "weight/mm": (1.0, " weights/mm"),
     "N·m": (1.0, " N·m"),
     "rad/s": (1.0, " rad/s"),
     "share": (100.0, " %"),
@@ -23,7 +25,9 @@ UNIT_OF = {
     **dict.fromkeys(("goal_position", "penetration", "gap", "gap_between", "slip", "replay_position"), "m"),
     **dict.fromkeys(("goal_angle", "joint_limit", "replay_angle"), "deg"),
     **dict.fromkeys(("residual", "residual_between", "friction_excess", "pull", "unsupplied_force"), "weight"),
-    **dict.fromkeys(("speed", "torque", "replay_dropped"), "share"),
+    "torsion_excess": "weight",
+    "least_stiffness": "N·m/rad",
+    **dict.fromkeys(("speed", "torque", "replay_dropped", "torsion_shortfall"), "share"),
     "disturbance_radius": "weight",
 }
 """Units of the limits."""
