@@ -75,7 +75,8 @@ def joint_torques(hand: Hand, motion: Motion) -> np.ndarray:
                     continue
                 point = origin + turned.apply(motion.contact_point_link[:, c])
                 force = to_palm.apply(motion.contact_force[:, c])
+                moment = 0.0 if motion.contact_moment is None else to_palm.apply(motion.contact_moment[:, c])
                 for column, at, axis in zip(columns, origins, axes, strict=False):
-                    torques[:, column] += np.sum(axis * np.cross(point - at, force), axis=1)
+                    torques[:, column] += np.sum(axis * (np.cross(point - at, force) + moment), axis=1)
             origin = origin + turned.apply([0.0, 0.0, link.length])
     return torques

@@ -25,6 +25,7 @@ _UNITS = {
     "contact_force": "N",
     "contact_point_object": "m",
     "contact_point_link": "m",
+    "contact_moment": "N m",
     "contact_force_disturbed": "N",
     "external_force": "N",
     "external_torque": "N m",

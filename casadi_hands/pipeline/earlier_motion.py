@@ -53,7 +53,19 @@ def earlier_motion(hand: Hand, motion: Motion, old: Model, model: Model) -> Whol
         force=np.tensordot(between, forces, axes=1) * active[:, :, None],
         active=active,
         solution=NOT_SOLVED,
+        torsion=_torsion(motion, turns, old, model, between),
     )
+
+
+def _torsion(motion: Motion, turns: Array, old: Model, model: Model, between: Array) -> Array | None:
+    """Moments over the radius of torsional friction (S, C), m·g, at the new samples; None of hard points."""
+    if not model.torsion or motion.contact_moment is None:
+        return None
+    moments = np.einsum("sji,scj->sci", turns, in_columns(motion, model, motion.contact_moment))
+    points = in_columns(motion, model, motion.contact_point_object)
+    normals = np.array([[body.outward(p) for body, p in zip(model.touched, row, strict=True)] for row in points])
+    radius = model.torsion * model.units.length * old.units.force
+    return np.asarray(between @ np.einsum("sci,sci->sc", moments, normals) / radius)
 
 
 def in_columns(motion: Motion, model: Model, values: NDArray[Any]) -> NDArray[Any]:

@@ -32,6 +32,8 @@ class WholeHand:
         active: (S, C) bool.
         solution: of the solver.
         disturbed: (S, C, 3) forces that hold the object on the same path under the task's perturbations; None without.
+        torsion: (S, C) moments on the object about its outward normals, over the radius of the torsional friction: m·g;
+            None of hard points.
     """
 
     fingers: tuple[FingerSeed, ...]
@@ -46,6 +48,7 @@ class WholeHand:
     active: NDArray[np.bool_]
     solution: Solution
     disturbed: Array | None = None
+    torsion: Array | None = None
 
 
 def turned(start: Array, vector: Array) -> Array:

@@ -1,7 +1,8 @@
 """What the loads of a task ask of the contacts at least, before any motion is known: statics at its samples.
 
-The object stands on the straight way between the goals, the contacts are where the task puts them, and friction's cones
-are circumscribed: the least is a little less than what any motion needs.
+The object stands on the straight way between the goals, the contacts are where the task puts them, friction's cones are
+circumscribed, and a soft fingertip twists with all of its torsion whatever else it bears: the least is a little less
+than what any motion needs.
 """
 
 from __future__ import annotations
@@ -102,4 +103,10 @@ def _balances(model: Model) -> Iterator[tuple[float, Array, Array, Array, Array,
             count = model.contacts + grounded
             forces = spread_forces(normals[:count], friction[:count], _EDGES)
             wrenches = grasp_map(points[:count]) @ forces
+            if model.torsion:
+                # Each edge twice, with all of its contact's torsion one way and the other.
+                twist = np.zeros_like(wrenches)
+                fingers = np.repeat(normals[: model.contacts], _EDGES, axis=0)
+                twist[3:, : len(fingers)] = model.torsion * fingers.T
+                forces, wrenches = np.tile(forces, (1, 2)), np.hstack([wrenches - twist, wrenches + twist])
             yield float(schedule.samples[k]), force, torque, forces, wrenches, needed

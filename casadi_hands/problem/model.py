@@ -64,6 +64,8 @@ class Model:
         speed_limit: of a joint in rad/s, or inf.
         force_limit: of each component of a contact force, object frame, in m·g.
         clearance: that bodies which do not touch keep from each other, lengths.
+        stiffness: of a joint in m·g·length/rad.
+        torsion: radius of the fingertips' torsional friction, lengths; 0 for hard points.
         regrasp: planned, or None where fingers stay where they touch.
         own_terms: costs and constraints that a person adds to those of the stages.
     """
@@ -94,6 +96,8 @@ class Model:
     speed_limit: float
     force_limit: float
     clearance: float
+    stiffness: float
+    torsion: float
     regrasp: Regrasp | None = None
     own_terms: tuple[OwnTerm, ...] = ()
 

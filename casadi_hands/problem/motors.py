@@ -1,8 +1,7 @@
-"""Position-control gains of a hand's joints, derived from what the hand has to hold.
+"""The motors of a hand's joints: springs about their set points, as stiff as the task says.
 
-A motor is stiff enough that the load a joint may meet deflects it by 50 mrad, and its own inertia (of rotor and
-gears, seen at the joint) answers with a natural frequency of 200 rad/s, critically damped. Every number follows
-from mass, gravity and lengths, so a task scaled in length and gravity gets the same behaviour.
+A motor's own inertia (of rotor and gears, seen at the joint) answers with a natural frequency of 200 rad/s. Where the
+task names no damping it is critical, the links beyond the joint moving along, stretched straight out.
 """
 
 from __future__ import annotations
@@ -15,9 +14,8 @@ from casadi_hands.problem.inertia import link_inertial
 
 if TYPE_CHECKING:
     from casadi_hands.problem.hand import Finger, Hand
-    from casadi_hands.task import Task
+    from casadi_hands.task import Actuator, Task
 
-_DEFLECTION = 0.05  # rad, under the reference load
 _FREQUENCY = 200.0  # rad/s, of the motor's inertia on its stiffness
 
 
@@ -40,25 +38,22 @@ def joint_motors(task: Task, hand: Hand) -> tuple[Motor, ...]:
     """A motor for every joint, in the order of ``hand.joint_names``.
 
     Args:
-        task: gives the object's mass and weight.
-        hand: gives lengths, and the links' own masses.
+        task: names the actuator.
+        hand: whose links the motors move.
     """
-    gravity = task.force_unit / task.object.mass  # 9.81 where the task has none
     return tuple(
-        _motor(finger, j, hand.density, task.object.mass, gravity)
-        for finger in hand.fingers
-        for j in range(len(finger.links))
+        _motor(task.actuator, finger, j, hand.density) for finger in hand.fingers for j in range(len(finger.links))
     )
 
 
-def _motor(finger: Finger, joint: int, density: float, object_mass: float, gravity: float) -> Motor:
-    """The motor of one joint, for the finger stretched straight out from it."""
-    reach, links_mass, links_inertia = 0.0, 0.0, 0.0
+def _motor(actuator: Actuator, finger: Finger, joint: int, density: float) -> Motor:
+    """The motor of one joint."""
+    armature = actuator.stiffness / _FREQUENCY**2
+    if actuator.damping is not None:
+        return Motor(actuator.stiffness, actuator.damping, armature)
+    reach, links = 0.0, 0.0
     for link in finger.links[joint:]:
         body = link_inertial(link, density)
-        links_mass += body.mass
-        links_inertia += body.inertia[0, 0] + body.mass * (reach + link.length / 2) ** 2
+        links += body.inertia[0, 0] + body.mass * (reach + link.length / 2) ** 2
         reach += link.length
-    stiffness = (object_mass + links_mass) * gravity * reach / _DEFLECTION
-    armature = stiffness / _FREQUENCY**2
-    return Motor(stiffness, 2 * sqrt(stiffness * (armature + links_inertia)), armature)
+    return Motor(actuator.stiffness, 2 * sqrt(actuator.stiffness * (armature + links)), armature)

@@ -53,3 +53,37 @@ def contact_jacobians(model: Model, motion: WholeHand, finger: int) -> Array:
     axes = np.einsum("kjab,jb->kja", rotations, own.axis_vectors)
     contact = in_palm(model, motion, motion.point[:, motion.contacts[finger]])
     return np.ascontiguousarray(np.cross(axes, contact[:, None] - origins).transpose(0, 2, 1))
+
+
+def forces_of_joint_errors(model: Model, motion: WholeHand, finger: int, error: float) -> Array:
+    """(S,) by how much a finger's normal force changes, m·g, where its joints' sensors are off and the object is held.
+
+    Args:
+        model: the task.
+        motion: of the samples.
+        finger: index of the finger among the motion's.
+        error: of each sensor, rad, to either side.
+    """
+    contact = motion.contacts[finger]
+    normals = np.array([model.touched[contact].outward(point) for point in motion.point[:, contact]])
+    normals = turned_to_palm(motion, turned_to_world(model, motion, normals))
+    # Joints with hardly any moment arm push against the structure, not the object.
+    inverse = np.linalg.pinv(contact_jacobians(model, motion, finger), rcond=0.1)
+    return np.asarray(error * model.stiffness * np.abs(np.einsum("snj,sj->sn", inverse, normals)).sum(axis=1))
+
+
+def contact_spins(model: Model, motion: WholeHand, finger: int, normals: Array) -> Array:
+    """(S - 1,) rad by which the object turns against a finger's last link from sample to sample.
+
+    Args:
+        model: the task.
+        motion: of the samples.
+        finger: index of the finger among the motion's.
+        normals: (S, 3) about which, object frame.
+    """
+    _, rotations = link_frames(motion.fingers[finger], model.link_radius, motion.angles[finger])
+    palms = np.array([pin.Quaternion(*q).matrix() for q in motion.palm_quaternion])
+    turns = np.array([object_rotation(model, v) for v in motion.vector])
+    relative = np.einsum("sba,scb,scd->sad", rotations[:, -1], palms, turns)
+    changes = np.einsum("sba,sbc->sac", relative[:-1], relative[1:])
+    return np.array([pin.log3(change) @ normal for change, normal in zip(changes, normals, strict=False)])

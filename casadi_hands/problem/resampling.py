@@ -77,6 +77,7 @@ def resampled(hand: WholeHand, before: Model, after: Model) -> WholeHand:
         force=np.tensordot(straight, hand.force, axes=1),
         active=hand.active[zero_order_hold(was, now)],
         disturbed=None,
+        torsion=None if hand.torsion is None else straight @ hand.torsion,
     )
     if not moves:
         return smooth

@@ -79,8 +79,10 @@ def build_model(task: Task) -> Model:
         link_radius=round_off(task.hand.link_radius / length),
         link_length=(round_off(task.hand.link_length[0] / length), round_off(task.hand.link_length[1] / length)),
         joint_limits=(math.radians(low), math.radians(high)),
-        torque_limit=math.inf if actuator is None else round_off(actuator.torque / units.torque),
-        speed_limit=math.inf if actuator is None else actuator.speed,
+        torque_limit=math.inf if actuator.torque is None else round_off(actuator.torque / units.torque),
+        speed_limit=math.inf if actuator.speed is None else actuator.speed,
+        stiffness=round_off(actuator.stiffness / units.torque),
+        torsion=round_off(task.fingertip.torsion / length),
         force_limit=given or USUAL_FORCE,
         clearance=round_off(task.hand.clearance / length),
     )
@@ -127,14 +129,14 @@ def _scenarios(task: Task, schedule: Schedule, units: Units) -> tuple[Scenario, 
     return planned(len(schedule.samples)), *([disturbed] if disturbed.acts.any() else [])
 
 
-_RESERVE = 1.5  # of torque and speed limits over what the motion uses, where the task names no actuator
+_RESERVE = 1.5  # of torque and speed limits over what the motion uses, where the task names none
 _LEAST = 0.01  # of the object's weight × length, and rad/s: no joint is so weak or slow that none could drive it
 
 
 def hand_of(
     task: Task, model: Model, fingers: Sequence[FingerSeed], contacts: Sequence[int], effort: float, speed: float
 ) -> Hand:
-    """The hand in SI; limits of the actuator if the task names one, else 1.5 times the motion's own torque and speed.
+    """The hand in SI; limits of the actuator where the task names them, else 1.5 times what the motion uses.
 
     Args:
         task: for what the stages do not know.
@@ -160,8 +162,8 @@ def hand_of(
         fingers=tuple(built),
         joint_lower=model.joint_limits[0],
         joint_upper=model.joint_limits[1],
-        effort=max(_RESERVE * effort, _LEAST * model.units.torque) if actuator is None else actuator.torque,
-        velocity=max(_RESERVE * speed, _LEAST) if actuator is None else actuator.speed,
+        effort=actuator.torque or max(_RESERVE * effort, _LEAST * model.units.torque),
+        velocity=actuator.speed or max(_RESERVE * speed, _LEAST),
         density=task.hand.density,
     )
 

@@ -6,6 +6,11 @@ from pydantic import Field, field_validator
 
 from casadi_hands.task.fields import NonNegative, Number, Pair, Positive, Section, Vector, refuse
 
+USUAL_STIFFNESS = 1.0
+"""N·m/rad. A 20 g servo (XL330-M288) answers with its stall torque, 0.52 N·m, to 0.43 rad at the gain it is delivered
+with: 1.2 N·m/rad; twice to four times that with its gain turned up. A printed finger of 5 mm radius and 50 mm length
+(PLA, 2.5 GPa) bends like a spring of 75 N·m/rad at its root, and takes next to nothing off that."""
+
 
 class FingerSpec(Section):
     """A finger, known by its contact with the object."""
@@ -25,6 +30,26 @@ class Ground(Section):
     touches: Vector = Field(
         description="Where the object may rest on the ground, m, object frame; moved onto the nearest surface.",
         json_schema_extra={"default": "the object's lowest point at the first goal"},
+    )
+
+
+def rubber_torsion(friction: float, radius: float) -> float:
+    """Radius of the torsional friction of a rubber tip, m: a patch of 0.3 of its radius, pressed evenly.
+
+    Args:
+        friction: Coulomb's, of sliding.
+        radius: of the tip, m.
+    """
+    return 2 / 3 * friction * 0.3 * radius
+
+
+class Fingertip(Section):
+    """What the fingers touch with."""
+
+    torsion: NonNegative = Field(
+        description="Radius of the torsional friction, m: a contact resists a twist about its normal by at most this "
+        "times its normal force. 0 is a hard point.",
+        json_schema_extra={"default": "0.2 × friction × hand.link_radius, of a rubber tip"},
     )
 
 
@@ -70,5 +95,15 @@ class HandSpec(Section):
 class Actuator(Section):
     """The motor of every joint."""
 
-    torque: Positive = Field(description="Largest torque, N·m.")
-    speed: Positive = Field(description="Largest speed, rad/s.")
+    torque: Positive | None = Field(default=None, description="Largest torque, N·m; free if not given.")
+    speed: Positive | None = Field(default=None, description="Largest speed, rad/s; free if not given.")
+    stiffness: Positive = Field(
+        default=USUAL_STIFFNESS,
+        description="Torque by which a joint held at its set point resists a turn, N·m/rad, motor, gears and finger "
+        "together.",
+    )
+    damping: Positive | None = Field(
+        default=None,
+        description="Torque by which it resists a speed, N·m·s/rad.",
+        json_schema_extra={"default": "critical, for a natural frequency of 200 rad/s of motor and links"},
+    )

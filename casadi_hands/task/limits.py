@@ -29,6 +29,13 @@ class Limits(Section):
     pull: NonNegative = Field(
         default=0.0, description="Normal force by which a contact would have to suck, over weight."
     )
+    torsion_excess: NonNegative = Field(
+        default=1e-3,
+        description="Torsional moment beyond what a fingertip bears beside its force: over its radius, over weight.",
+    )
+    torsion_shortfall: NonNegative = Field(
+        default=0.15, description="Share by which the moment of a contact that spins is off its limit against the spin."
+    )
     penetration: NonNegative = Field(default=0.0001, description="Depth by which two bodies overlap, m.")
     gap: NonNegative = Field(default=0.00005, description="Distance of an active contact's surfaces at samples, m.")
     gap_between: NonNegative = Field(default=0.0001, description="The same between samples, m.")
@@ -43,6 +50,11 @@ class Limits(Section):
         default=0.0,
         description="Least size of the smallest wrench the grasp cannot resist, over weight. 0 asks for none: two "
         "point contacts can never resist a spin about the line through them.",
+    )
+    least_stiffness: NonNegative = Field(
+        default=1.0,
+        description="Least stiffness of the joints with which the planned grasp holds itself, N·m/rad.",
+        json_schema_extra={"default": "`actuator.stiffness`"},
     )
     replay_position: NonNegative = Field(
         default=0.002,

@@ -9,7 +9,7 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from casadi_hands.motion import nearest_exponential
 from casadi_hands.task.fields import Positive, Section, Vector, Whole, fill, follows, refuse
-from casadi_hands.task.hand import Actuator, FingerSpec, Ground, HandSpec
+from casadi_hands.task.hand import Actuator, FingerSpec, Fingertip, Ground, HandSpec, rubber_torsion
 from casadi_hands.task.limits import Limits, usual_replay_position
 from casadi_hands.task.motion import Goal, Perturbation
 from casadi_hands.task.object import ManipulatedObject
@@ -55,7 +55,8 @@ class Task(Section):
     )
     perturbations: tuple[Perturbation, ...] = Field(default=(), description="Disturbances that the grasp must stand.")
     hand: HandSpec = Field(default={}, validate_default=True, description="What fingers can be built.")
-    actuator: Actuator | None = Field(default=None, description="The motors; without it torque and speed are free.")
+    fingertip: Fingertip = Field(default={}, validate_default=True, description="The tips of the fingers.")
+    actuator: Actuator = Field(default=Actuator(), description="The motors.")
     limits: Limits = Field(default={}, validate_default=True, description="Limits of the certificate.")
     search: Search = Field(default=Search(), description="The search over structures.")
     weights: Weights = Field(default=Weights(), description="Weights of the soft stages' cost terms.")
@@ -101,11 +102,19 @@ class Task(Section):
             length = (2.0 * radius, max(2.0 * radius, reach))
         return {**value, "link_length": length}
 
+    @field_validator("fingertip", mode="before")
+    @classmethod
+    def _fingertip_defaults(cls, value: Any, info: ValidationInfo) -> Any:
+        hand, friction = info.data.get("hand"), info.data.get("friction", 1.0)
+        return fill(value, torsion=rubber_torsion(friction, hand.link_radius if hand else 1.0))
+
     @field_validator("limits", mode="before")
     @classmethod
     def _limits_defaults(cls, value: Any, info: ValidationInfo) -> Any:
         body = info.data.get("object")
-        return fill(value, replay_position=usual_replay_position(body.characteristic_length) if body else 1.0)
+        motor = info.data.get("actuator") or Actuator()
+        position = usual_replay_position(body.characteristic_length) if body else 1.0
+        return fill(value, replay_position=position, least_stiffness=motor.stiffness)
 
     @property
     def draws(self) -> bool:

@@ -28,6 +28,7 @@ DEFECT = Constraint(
     "defect", "Newton–Euler from knot to knot", "", "be moved as planned by the forces of its contacts", _PACE, _BALANCE
 )
 WRENCH_OF_CONTACTS = replace(DEFECT, name="sum", equation="eq. 2.5 and 2.6: the contacts' wrench")
+TORSION_OF_CONTACTS = replace(DEFECT, name="torsion", equation="eq. 2.5: the torsion of all contacts")
 EQUILIBRIUM = Constraint("sum", "rest without a jolt", "", "be held still at the start and the end", _PACE, _BALANCE)
 DISTURBED_WRENCH = Constraint(
     "sum",
@@ -89,6 +90,24 @@ NO_SLIP = Constraint(
     "roll with the object",
     f"{_JOINTS} or a smaller turn of the object",
     ("slip", *_GAP, *_BALANCE),
+)
+
+SPIN_RATE = Constraint("spin_rate", "the turn of object against fingertip about the contact's normal", "speed")
+TORSION_CONE = Constraint(
+    "torsion_cone",
+    "(f_t / μ)² + (m / ρ)² <= f_n²",
+    "",
+    "hold against a twist and a pull at once",
+    _HOLDING,
+    ("torsion",),
+)
+TORSION_LAW = Constraint(
+    "torsion_law",
+    "torsion at its limit against the spin, where the contact spins",
+    "force",
+    "resist a twist as its tip does",
+    "a harder fingertip (fingertip.torsion: 0), or more joints (search.max_joints)",
+    ("torsion_use", *_BALANCE),
 )
 
 # The same under a disturbance.

@@ -74,6 +74,13 @@ STAY_POINT = Term(
 STAY_FORCE = Term(
     "stay_force", "Forces other than those it begins with", "", "m·g", weights={"refine": Weight(0.02, "knot")}
 )
+GRIP = Term(
+    "grip",
+    "Normal force, which stiffness has to make up for",
+    "",
+    "m·g",
+    weights={"refine": Weight(0.02, "knot")},
+)
 FRICTION_MARGIN = Term(
     "friction_margin",
     "Fourth power of the friction in use",
@@ -83,6 +90,8 @@ FRICTION_MARGIN = Term(
 )
 SLIP = Term("slip", "Slip from knot to knot", "eq. 2.12", "length/s", weights={"refine": Weight(3.0, "knot")})
 SPIN = Term("spin", "Spin about the contact's normal", "", "rad/s", weights={"refine": Weight(0.1, "knot")})
+
+TORSION = Term("torsion", "Torsion, over its radius", "", "m·g", weights={"refine": Weight(0.01, "knot")})
 
 
 def friction_cone(force: SX, inward_normal: SX, friction: SX, sharpness: SX) -> SX:
@@ -154,3 +163,23 @@ def spin(change: SX, normal: SX, step: SX) -> SX:
     """Rate of turn about a normal (3,), rad/s, of a change of orientation (3, 3) in one step."""
     turned = ca.vertcat(change[2, 1] - change[1, 2], change[0, 2] - change[2, 0], change[1, 0] - change[0, 1]) / 2
     return ca.dot(turned, normal) / step
+
+
+def torsion_limit(pressing: SX, across: SX, friction: SX, rounding: float = 1e-6) -> SX:
+    """Largest torsion over its radius, m·g: √(f_n² - f_t²/μ²), rounded where nothing is left of it.
+
+    A soft fingertip slips where (f_t / μ)² + (m / ρ)² exceeds f_n² (the ellipse of Howe and Cutkosky, 1996).
+
+    Args:
+        pressing: normal force f_n, m·g.
+        across: square of the tangential force f_t, (m·g)².
+        friction: μ.
+        rounding: (m·g)².
+    """
+    left = pressing**2 - across / friction**2
+    return ca.sqrt((left + ca.sqrt(left**2 + rounding**2)) / 2)
+
+
+def spinning(spin: SX, scale: SX) -> SX:
+    """How much a contact spins, from -1 to 1: 0 where it rests, ±1 where it is far quicker than the scale, rad/s."""
+    return spin / ca.sqrt(spin**2 + scale**2)

@@ -26,6 +26,8 @@ from casadi_hands.verify.figures.contact import (
 from casadi_hands.verify.figures.disturbances import disturbed_figures
 from casadi_hands.verify.figures.dynamics import Shots, between_residual, sample_residual, shoot
 from casadi_hands.verify.figures.goals import goal_figures, rest_figure
+from casadi_hands.verify.figures.stiffness import stability_figures
+from casadi_hands.verify.figures.torsion import torsion_figures
 from casadi_hands.verify.figures.wrench import disturbance_figure, torque_figure, unsupplied_figure
 from casadi_hands.verify.reading.folder import Folder, read_folder
 from casadi_hands.verify.replays.series import TOGETHER, run_replays
@@ -87,6 +89,7 @@ def audit_files(directory: str | Path, task: str | Path | None = None) -> Audit:
         *residual_figures(folder, shots),
         *disturbed_figures(folder),
         *friction_figures(folder, placed),
+        *torsion_figures(folder, placed, path),
         gap_at_samples(folder, placed),
         gap_between_samples(folder, path),
         slip_figure(folder, path),
@@ -96,6 +99,7 @@ def audit_files(directory: str | Path, task: str | Path | None = None) -> Audit:
         torque_figure(folder),
         unsupplied_figure(folder),
         disturbance_figure(folder, placed),
+        *stability_figures(folder),
     ]
     return Audit(folder.task.name, {figure.name: figure for figure in figures}, tuple(problems), limit_notes(folder))
 

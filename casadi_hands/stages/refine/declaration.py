@@ -67,6 +67,11 @@ class Declaration:
         self.force = problem.variable("force", (count, width), -most, most)
         self.wrench = problem.variable("wrench", (count, 6))
         self.middle_torque = problem.variable("middle_torque", (count - 1, 3))
+        if model.torsion:
+            fingers = len(structure.contacts)
+            self.torsion = problem.variable("torsion", (count, fingers))
+            self.spin = problem.variable("spin", (count - 1, fingers))
+            self.twist_torque = problem.variable("twist_torque", (count, 3))
         if len(self.disturbed):
             shape = (len(self.disturbed), width)
             self.force_disturbed = problem.variable("force_disturbed", shape, -most, most, quantity="force")
@@ -93,6 +98,8 @@ class Declaration:
         widths = {"reference": 4, "gravity": 3, "inertial": 1, "inertia": 9, "inverse": 9, "radius": 1}
         widths |= {"palm_radius": 1, "ground_height": 1, "friction": 1}
         widths |= {"bodies": width_of(structure.model.kinds)}
+        if structure.model.torsion:
+            widths |= {"torsion_radius": 1, "torsion_margin": 1, "sliding_friction": 1, "spin_scale": 1}
         for name, width in widths.items():
             problem.parameter(name, (1, width))
         problem.parameter("step", (count - 1, 1))

@@ -74,8 +74,8 @@ def bind_rolling(of: Declaration, i: int) -> None:
     scenes = of.scene(c, start), of.scene(c, start + 1)
     of.bind(
         start,
-        kernels.rolling(n, kind),
-        {"no_slip": FREE},
+        kernels.rolling(n, kind, bool(structure.model.torsion)),
+        {"no_slip": FREE, "spin_rate": (0.0, 0.0)},
         (c,),
         f"rolling{c}",
         **_shape(of, i, start),
@@ -84,6 +84,7 @@ def bind_rolling(of: Declaration, i: int) -> None:
             for name, rows in (("pose", of.pose), ("point", point), ("angles", of.angles[i]))
         },
         **{name: (scenes[0][name], scenes[1][name]) for name in scenes[0]},
+        **({"spin": of.spin.take(start).entries(i, i + 1, c)} if structure.model.torsion else {}),
         **of.at(start, "step"),
         **of.of(c, start, "frames", "helper"),
     )

@@ -114,18 +114,15 @@ def contact(joints: int, kind: type[Body], limited: bool) -> Kernel:
     wanted_point, wanted_force = kernel.parameter("wanted_point", 3), kernel.parameter("wanted_force", 3)
     touch = scene.touch(pose, point, angles, symbols)
     if joints in MARGIN_SIZES:
-        kernel.constrain(
-            limits.SINGULARITY_MARGIN,
-            ca.dot(
-                kernel.parameter("margin_direction", MARGIN_SIZES[joints]), singularity_margin(touch.placed.jacobian)
-            ),
-        )
+        direction = kernel.parameter("margin_direction", MARGIN_SIZES[joints])
+        kernel.constrain(limits.SINGULARITY_MARGIN, ca.dot(direction, singularity_margin(touch.placed.jacobian)))
     kernel.constrain(limits.ON_OBJECT, touch.off_object)
     kernel.constrain(limits.ON_LINK, touch.off_link)
     pressing, across, structural = _hold(kernel, touch, force, friction, limited)
     kernel.cost(finger.STRUCTURAL_FORCE, structural)
     kernel.cost(contact_terms.STAY_POINT, tie * (point - wanted_point))
     kernel.cost(contact_terms.STAY_FORCE, force - wanted_force)
+    kernel.cost(contact_terms.GRIP, pressing)
     kernel.cost(contact_terms.FRICTION_MARGIN, contact_terms.friction_in_use(pressing, across, friction))
     return kernel
 
@@ -184,8 +181,8 @@ def _structural(touch: Touch, force: SX) -> SX:
 
 
 @cache
-def rolling(joints: int, kind: type[Body]) -> Kernel:
-    """One contact from one knot to the next: its paths over both surfaces agree (no slip), and its spin costs."""
+def rolling(joints: int, kind: type[Body], soft: bool) -> Kernel:
+    """One contact from one knot to the next: no slip, and its spin costs; of soft tips it is a variable."""
     kernel = Kernel("rolling")
     symbols = free_morphology(kernel, joints)
     poses, points, angles = [], [], []
@@ -206,7 +203,10 @@ def rolling(joints: int, kind: type[Body]) -> Kernel:
     relative_before = ca.mtimes(before.placed.tip_rotation.T, before.rotation)
     relative_after = ca.mtimes(after.placed.tip_rotation.T, after.rotation)
     change = ca.mtimes(relative_before.T, relative_after)
-    kernel.cost(contact_terms.SPIN, contact_terms.spin(change, before.normal, step))
+    spin = contact_terms.spin(change, before.normal, step)
+    kernel.cost(contact_terms.SPIN, spin)
+    if soft:
+        kernel.constrain(limits.SPIN_RATE, spin - kernel.variable("spin", 1))
     return kernel
 
 

@@ -12,7 +12,7 @@ from casadi_hands.stages.refine.declaration import FREE, IN_CONE, Declaration
 
 def bind_physics(of: Declaration) -> None:
     """Newton–Euler from knot to knot, rest at both ends, disturbances, and what keeps the motion smooth."""
-    problem, columns = of.problem, len(of.structure.columns)
+    problem, columns, soft = of.problem, len(of.structure.columns), bool(of.structure.model.torsion)
     every, now, later = np.arange(of.knots), np.arange(of.knots - 1), np.arange(1, of.knots)
     of.bind(
         now,
@@ -24,7 +24,9 @@ def bind_physics(of: Declaration) -> None:
         middle_torque=of.middle_torque,
         **of.at(now, "reference", "step", "gravity", "inertial", "inertia", "inverse"),
     )
-    of.bind(every, kernels.wrench(columns), {"sum": (0, 0)}, wrench=of.wrench, point=of.point, force=of.force)
+    twist = {"twist_torque": of.twist_torque} if soft else {}
+    kernel = kernels.wrench(columns, soft)
+    of.bind(every, kernel, {"sum": (0, 0)}, wrench=of.wrench, point=of.point, force=of.force, **twist)
     inner = np.arange(of.knots - 2)
     carried = np.hstack([carried_velocity(of.structure.model), np.zeros((of.knots, 3))])
     rates = [of.rate.plus(-carried).take(inner + k) for k in range(3)]
@@ -34,8 +36,9 @@ def bind_physics(of: Declaration) -> None:
     of.bind(ends, kernels.equilibrium(), {"sum": (0, 0)}, **still, **of.at(ends, "reference", "gravity"))
     of.bind(
         now,
-        kernels.middle_torque(columns),
+        kernels.middle_torque(columns, soft),
         {"sum": (0, 0)},
+        **{name: (rows.take(now), rows.take(later)) for name, rows in twist.items()},
         middle_torque=of.middle_torque,
         point=(of.point.take(now), of.point.take(later)),
         force=(of.force.take(now), of.force.take(later)),
@@ -47,8 +50,9 @@ def bind_physics(of: Declaration) -> None:
             problem.parameter(f"external_{kind}", (len(of.disturbed), 3))
         of.bind(
             of.disturbed,
-            kernels.disturbed(columns),
+            kernels.disturbed(columns, soft),
             {"sum": (0, 0)},
+            **{name: rows.take(of.disturbed) for name, rows in twist.items()},
             pose=of.pose.take(of.disturbed),
             wrench=of.wrench.take(of.disturbed),
             point=of.point.take(of.disturbed),

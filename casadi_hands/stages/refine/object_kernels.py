@@ -14,6 +14,7 @@ from casadi_hands.geometry.surface import path_between
 from casadi_hands.motion import conjugate, derivative, multiply, rotation_matrix
 from casadi_hands.motion.pose import placed
 from casadi_hands.nlp import Constraint, Kernel
+from casadi_hands.stages.refine.torsion import twist_torque
 from casadi_hands.terms import body, contact
 from casadi_hands.terms import constraints as limits
 
@@ -23,23 +24,25 @@ _GAUSS, _GAUSS_WEIGHTS = (leggauss(3)[0] + 1) / 2, leggauss(3)[1] / 2
 
 
 @cache
-def wrench(contacts: int) -> Kernel:
+def wrench(contacts: int, soft: bool) -> Kernel:
     """The contacts' force and torque at a knot, as variables of their own: physics then knows no contacts."""
     kernel = Kernel("wrench")
     total = kernel.variable("wrench", 6)
     points, forces = _contacts(kernel, contacts)
-    kernel.constrain(limits.WRENCH_OF_CONTACTS, ca.vertcat(ca.sum2(forces), _torque(points, forces)) - total)
+    torque = _torque(points, forces) + twist_torque(kernel, soft)
+    kernel.constrain(limits.WRENCH_OF_CONTACTS, ca.vertcat(ca.sum2(forces), torque) - total)
     return kernel
 
 
 @cache
-def middle_torque(contacts: int) -> Kernel:
+def middle_torque(contacts: int, soft: bool) -> Kernel:
     """The contacts' torque halfway between two knots, with forces and points linear in the object's frame."""
     kernel = Kernel("middle_torque")
     middle = kernel.variable("middle_torque", 3)
     ends = [_contacts(kernel, contacts, i) for i in range(2)]
     points, forces = ((ends[0][i] + ends[1][i]) / 2 for i in range(2))
-    kernel.constrain(limits.WRENCH_OF_CONTACTS, _torque(points, forces) - middle)
+    twist = (twist_torque(kernel, soft, 0) + twist_torque(kernel, soft, 1)) / 2
+    kernel.constrain(limits.WRENCH_OF_CONTACTS, _torque(points, forces) + twist - middle)
     return kernel
 
 
@@ -122,8 +125,8 @@ def _quintic(start: tuple[SX, SX, SX], end: tuple[SX, SX, SX], s: float) -> SX:
 
 
 @cache
-def disturbed(contacts: int) -> Kernel:
-    """Second forces at a knot that, with an external push, make the same wrench as the first ones alone."""
+def disturbed(contacts: int, soft: bool) -> Kernel:
+    """Second forces at a knot that, with a push from outside and the same torsion, make the wrench of the first."""
     kernel = Kernel("disturbed")
     pose, total = kernel.variable("pose", 6), kernel.variable("wrench", 6)
     points, forces = _contacts(kernel, contacts)
@@ -132,7 +135,8 @@ def disturbed(contacts: int) -> Kernel:
     _, quaternion = placed(pose, reference)
     to_object = rotation_matrix(conjugate(quaternion))
     push = ca.vertcat(ca.mtimes(to_object, force), ca.mtimes(to_object, torque))
-    kernel.constrain(limits.DISTURBED_WRENCH, ca.vertcat(ca.sum2(forces), _torque(points, forces)) + push - total)
+    torque = _torque(points, forces) + twist_torque(kernel, soft)
+    kernel.constrain(limits.DISTURBED_WRENCH, ca.vertcat(ca.sum2(forces), torque) + push - total)
     kernel.cost(body.DISTURBED_FORCE, forces)
     return kernel
 

@@ -15,6 +15,7 @@ from casadi_hands.nlp import Kernel, Parameter, Problem, Rows
 from casadi_hands.nlp.layout import Label
 from casadi_hands.terms.finger import PROXIMITY
 
+FOLLOWING = ("rate", "wrench", "middle_torque", "spin", "twist_torque")  # what all else decides
 FORCE_SHARE = 0.1  # lengths that are as far to go as a force of one weight
 
 
@@ -30,11 +31,11 @@ class Proximity:
 
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
-        self._names = [name for name in problem.variables.names() if name not in ("rate", "wrench", "middle_torque")]
+        self._names = [name for name in problem.variables.names() if name not in FOLLOWING]
         for name in self._names:
             indices = problem.variables[name]
             where = problem.parameter(f"near.{name}", indices.shape)
-            share = FORCE_SHARE if name.startswith("force") else 1.0
+            share = FORCE_SHARE if name.startswith(("force", "torsion")) else 1.0
             value = Rows.of(indices.reshape(-1, 1), problem.variables.size, Label("value"))
             near = Parameter(where.positions.reshape(-1, 1), Label("near"))
             problem.bind(_near(share), value=value, near=near)

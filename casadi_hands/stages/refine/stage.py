@@ -167,7 +167,10 @@ class RefineStage:
         active[:, columns] = self.structure.active
         point[:, columns] = values["point"].reshape(count, -1, 3)
         force[:, columns] = values["force"].reshape(count, -1, 3)
-        disturbed = None
+        disturbed, torsion = None, None
+        if self.model.torsion:
+            torsion = np.zeros(start.force.shape[:2])
+            torsion[:, list(self.contacts)] = values["torsion"]
         if len(knots := self.built.disturbed):
             disturbed = force.copy()
             disturbed[knots[:, None], columns] = values["force_disturbed"].reshape(len(knots), -1, 3)
@@ -192,6 +195,7 @@ class RefineStage:
             active=active,
             solution=solution,
             disturbed=disturbed,
+            torsion=torsion,
         )
         worst = self._worst(solution)
         hopeless = what != "hard constraints"

@@ -12,7 +12,7 @@ from casadi_hands.kinematics.singularity import LEAST_MARGIN, MARGIN_SIZES, marg
 from casadi_hands.motion import continuous
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
-from casadi_hands.problem.placement import contact_jacobians
+from casadi_hands.problem.placement import contact_jacobians, contact_spins
 from casadi_hands.stages.object_motion.values import MOST_TURN, tool_path
 from casadi_hands.stages.own_terms import own_values
 from casadi_hands.stages.refine.initial_guess import balanced, disturbance_wrenches, rates_and_wrenches
@@ -23,6 +23,7 @@ RAMP = 0.5  # s over which a contact that touches or lifts comes to press with i
 TOOL_TOLERANCE = 5e-3  # lengths, how far a drawing's tool may leave its path between goals
 LIFTING_TIE = 2.0  # of a contact to where it was planned, where it lets go in order to touch elsewhere
 SLIDING_TIE = 0.3  # of a contact to where it was planned to slide; it shall roll if it can
+SPIN_SCALE = 0.05  # rad/s: a contact that spins quicker has its torsion at the limit, or nearly so
 ROUGHLY = 10.0  # times of what no joint may supply at knots may be so between them, where motions are interpolated
 Bounds = dict[str, tuple[ArrayLike, ArrayLike]]
 
@@ -122,6 +123,8 @@ class RefineValues:
         most = model.force_limit
         bearing, active = (np.repeat(np.where(f, most, 0.0), 3, axis=1) for f in (self.bearing, self._active))
         upper = {"rate": rate, "force": bearing}
+        if model.torsion:
+            upper["torsion"] = np.where(self.bearing[:, : len(self.structure.contacts)], most, 0.0)
         if len(self.disturbed):
             # A disturbance may begin with a touch, and what resists it is no force that has to grow.
             upper["force_disturbed"] = active[self.disturbed]
@@ -141,8 +144,13 @@ class RefineValues:
             "force": forces.reshape(count, -1),
             "wrench": np.hstack([forces.sum(axis=1), np.cross(points, forces).sum(axis=1)]),
         }
-        at, pushing = ((a[1:] + a[:-1]) / 2 for a in (points, forces))
-        values["middle_torque"] = np.cross(at, pushing).sum(axis=1)
+        twist = np.zeros((count, 3))
+        if self.model.torsion:
+            spins, torsion, twist = self._torsion(motion)
+            values |= {"spin": spins, "torsion": torsion, "twist_torque": twist}
+            values["wrench"][:, 3:] += twist
+        at, pushing, twisting = ((a[1:] + a[:-1]) / 2 for a in (points, forces, twist))
+        values["middle_torque"] = np.cross(at, pushing).sum(axis=1) + twisting
         if len(k := self.disturbed):
             needed = wrenches[k] - disturbance_wrenches(self.model, motion.vector)[k]
             disturbed = balanced(points[k], forces[k], self._active[k], needed)
@@ -151,6 +159,17 @@ class RefineValues:
             values |= {f"angles{c}": angles, f"base{c}": finger.base, f"lengths{c}": finger.lengths}
             values[f"axes{c}"] = finger.axes.reshape(1, -1)
         return values
+
+    def _torsion(self, motion: WholeHand) -> tuple[Array, Array, Array]:
+        """Spin (S - 1, F), rad/s, of each finger's contact, torsion over its radius (S, F) and its torque (S, 3)."""
+        model, contacts = self.model, list(self.structure.contacts)
+        steps = np.diff(model.schedule.samples)
+        torsion = np.zeros((self.knots, len(contacts)))
+        if motion.torsion is not None:
+            torsion = np.where(self.bearing[:, : len(contacts)], motion.torsion[:, contacts], 0.0)
+        normals = np.array([[model.touched[c].outward(p) for p in motion.point[:, c]] for c in contacts])
+        spins = [contact_spins(model, motion, i, n) / steps for i, n in enumerate(normals)]
+        return np.array(spins).T, torsion, model.torsion * np.einsum("sf,fsi->si", torsion, normals)
 
     def parameters(self, motion: WholeHand, margin: Margin, wanted: WholeHand | None = None) -> dict[str, ArrayLike]:
         """Values of all parameters but the weights; costs hold a motion near to the wanted one, by default itself."""
@@ -176,6 +195,9 @@ class RefineValues:
             "wanted_pose": np.hstack([wanted.position, wanted.vector]),
         }
         values |= self.proximity.idle
+        if model.torsion:
+            values |= {"torsion_radius": model.torsion, "torsion_margin": margin.friction}
+            values |= {"sliding_friction": model.friction, "spin_scale": SPIN_SCALE}
         values |= own_values(self.problem, model)
         if model.disturbance is not None and len(self.disturbed):
             values["external_force"] = model.disturbance.force[self.disturbed]

@@ -12,6 +12,7 @@ from casadi_hands.verify.reading.folder import Folder
 _UNITS = {
     **dict.fromkeys(("object_position", "base_position", "contact_point_object", "contact_point_link"), "m"),
     **dict.fromkeys(("contact_force", "contact_force_disturbed", "external_force", "external_force_disturbed"), "N"),
+    "contact_moment": "N m",
     **dict.fromkeys(("joint_torques", "external_torque", "external_torque_disturbed"), "N m"),
     **dict.fromkeys(("joint_angles", "joint_commands"), "rad"),
     **{"time": "s", "joint_velocities": "rad/s"},

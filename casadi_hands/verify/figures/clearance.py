@@ -65,7 +65,7 @@ def joint_figures(folder: Folder, path: Trajectory) -> list[Figure]:
     i, j = np.unravel_index(np.argmax(speed), speed.shape)
     name = folder.motion.joint_names[j]
     where = f"joint {name} of {_finger(folder, name)} at {path.time[i]:.3g} s"
-    if folder.task.actuator is None:
+    if folder.task.actuator.speed is None:
         return [beyond, Figure("speed", float(speed[i, j]), None, "rad/s", f"{{value}} in {where}")]
     share = float(speed[i, j]) / folder.task.actuator.speed
     return [beyond, Figure("speed", share, limits.speed, "share", f"{{value}} of the actuator's speed in {where}")]

@@ -1,6 +1,6 @@
 """Does the object's motion follow from the forces stated for it?
 
-Between samples the file says nothing, so physics fills the gap: contact forces and contact points are linear in the
+Between samples the file says nothing, so physics fills the gap: contact forces, moments and points are linear in the
 object's frame from a sample's row to the next (a contact that is not active at the sample bears nothing until the
 next), the external force and torque are linear in the world, gravity is constant. From every sample the object is
 shot to the next: the launch velocity is the one that makes it arrive at the next sample's pose. In an exact motion the
@@ -50,19 +50,21 @@ class Loads:
         time: (K,) s, lengths of the intervals.
         force: two (K, C, 3) contact forces in the object's frame, N.
         point: two (K, C, 3) contact points in the object's frame, m.
+        moment: two (K, 3) torsional moments of all contacts together in the object's frame, N·m.
         external_force, external_torque: two (K, 3) in the world, N and N·m.
     """
 
     time: np.ndarray
     force: tuple[np.ndarray, np.ndarray]
     point: tuple[np.ndarray, np.ndarray]
+    moment: tuple[np.ndarray, np.ndarray]
     external_force: tuple[np.ndarray, np.ndarray]
     external_torque: tuple[np.ndarray, np.ndarray]
 
     def at(self, fraction: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return total contact force and moment (K, 3), object frame, and external force and torque (K, 3), world."""
         force, point = _blend(self.force, fraction), _blend(self.point, fraction)
-        moment = np.cross(point, force).sum(axis=1)
+        moment = np.cross(point, force).sum(axis=1) + _blend(self.moment, fraction)
         return (
             force.sum(axis=1),
             moment,
@@ -87,10 +89,13 @@ def read_loads(folder: Folder) -> Loads:
     force = np.einsum("sij,scj->sci", turned, motion.contact_force)
     active = motion.contact_active[:-1, :, None]
     point = motion.contact_point_object
+    moment = np.zeros_like(force) if motion.contact_moment is None else motion.contact_moment
+    moment = np.einsum("sij,scj->sci", turned, moment)
     return Loads(
         time=np.diff(motion.time),
         force=(force[:-1] * active, force[1:] * active),
         point=(point[:-1], point[1:]),
+        moment=((moment[:-1] * active).sum(axis=1), (moment[1:] * active).sum(axis=1)),
         external_force=(motion.external_force[:-1], motion.external_force[1:]),
         external_torque=(motion.external_torque[:-1], motion.external_torque[1:]),
     )

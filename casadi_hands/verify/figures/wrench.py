@@ -23,6 +23,15 @@ RESERVE = 2.0
 
 def contact_jacobian(folder: Folder, data: pin.Data, k: int, c: int) -> np.ndarray:
     """Return the Jacobian (3, J) of a link's contact point at a sample, palm frame, columns as the motion's joints."""
+    twist = link_jacobian(folder, data, k, c)
+    frame = folder.model.getFrameId(folder.motion.contact_link[c])
+    arm = data.oMf[frame].rotation @ folder.motion.contact_point_link[k, c]
+    jacobian: np.ndarray = twist[:3] - pin.skew(arm) @ twist[3:]
+    return jacobian
+
+
+def link_jacobian(folder: Folder, data: pin.Data, k: int, c: int) -> np.ndarray:
+    """Return the Jacobian (6, J) of a contact's link at a sample: velocity of its origin, then spin; palm frame."""
     model, columns = folder.model, folder.joint_columns()
     configuration = pin.neutral(model)
     configuration[columns] = folder.motion.joint_angles[k]
@@ -30,10 +39,8 @@ def contact_jacobian(folder: Folder, data: pin.Data, k: int, c: int) -> np.ndarr
     pin.computeJointJacobians(model, data, configuration)
     pin.updateFramePlacements(model, data)
     twist = pin.getFrameJacobian(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-    twist = np.reshape(twist, (6, model.nv))[:, columns]  # that of one joint comes as a vector
-    arm = data.oMf[frame].rotation @ folder.motion.contact_point_link[k, c]
-    jacobian: np.ndarray = twist[:3] - pin.skew(arm) @ twist[3:]
-    return jacobian
+    columned: np.ndarray = np.reshape(twist, (6, model.nv))[:, columns]  # that of one joint comes as a vector
+    return columned
 
 
 def planned_torques(folder: Folder, forces: np.ndarray | None = None) -> np.ndarray:
@@ -49,6 +56,9 @@ def planned_torques(folder: Folder, forces: np.ndarray | None = None) -> np.ndar
     for k, c in active_contacts(folder):
         if folder.motion.contact_link[c] != "ground":
             torques[k] += contact_jacobian(folder, data, k, c).T @ in_palm(folder, k, forces[k, c])
+            if folder.motion.contact_moment is not None:
+                spin = link_jacobian(folder, data, k, c)[3:]
+                torques[k] += spin.T @ in_palm(folder, k, folder.motion.contact_moment[k, c])
     return torques
 
 
@@ -68,7 +78,7 @@ def torque_figure(folder: Folder) -> Figure:
         where = f"joint {folder.motion.joint_names[j]} at {folder.motion.time[k]:.3g} s{scenario}"
         worst = worse(worst, (float(torques[k, j]), where))
     value, where = worst
-    if folder.task.actuator is None:
+    if folder.task.actuator.torque is None:
         return Figure("torque", value, None, "N·m", f"{{value}} in {where}")
     share = value / folder.task.actuator.torque
     return Figure("torque", share, folder.task.limits.torque, "share", f"{{value}} of the actuator's torque in {where}")

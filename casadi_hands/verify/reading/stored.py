@@ -38,6 +38,7 @@ _SHAPES: dict[str, tuple[str | int, ...]] = {
     "joint_velocities": ("S", "J"),
     "joint_torques": ("S", "J"),
     "joint_commands": ("S", "J"),
+    "contact_moment": ("S", "C", 3),
     "contact_force_disturbed": ("S", "C", 3),
     "external_force_disturbed": ("S", 3),
     "external_torque_disturbed": ("S", 3),

@@ -191,7 +191,7 @@ Knot = tuple[Array, Rotation, Array, float]
 
 def rolls(before: Knot, after: Knot) -> dict[str, Array]:
     """The rolling block of a ball at (position, orientation, contact in the palm frame, finger's angle) twice."""
-    return numbers(finger_kernels.rolling(1, Sphere), *rolling_block(before, after))
+    return numbers(finger_kernels.rolling(1, Sphere, False), *rolling_block(before, after))
 
 
 def rolling_block(before: Knot, after: Knot) -> Block:
@@ -362,7 +362,7 @@ def test_derivatives_agree_with_differences() -> None:
         (finger_kernels.contact(3, Capsule, limited=True), Contact(3, 1).contact),
         (finger_kernels.disturbed_contact(2, Capsule, limited=True), case.disturbed),
         (finger_kernels.actuated(2, Capsule), case.actuated),
-        (finger_kernels.rolling(1, Sphere), rolling_block(before, after)),
+        (finger_kernels.rolling(1, Sphere, False), rolling_block(before, after)),
         (finger_kernels.apart(2, (Capsule, Capsule), 1, grounded=True), clearance_block(one, place, primitives)),
         (finger_kernels.fingers_apart(2, 3), pair_block(one, other)),
         (
@@ -377,7 +377,7 @@ def test_derivatives_agree_with_differences() -> None:
 def test_derivatives_are_finite_where_nothing_moves_and_nothing_presses() -> None:
     # The object where its reference is, the finger straight up and on its seed axes, a contact with no force.
     knot = on_cap(0.3, 0.0)
-    check_block(finger_kernels.rolling(1, Sphere), *rolling_block(knot, knot), h=1e-6)
+    check_block(finger_kernels.rolling(1, Sphere, False), *rolling_block(knot, knot), h=1e-6)
     case = Contact(2, 0)
     case.finger = replace(case.finger, axes=np.zeros((2, 2)), angles=np.zeros((1, 2)))
     case.place.vector, case.force = np.zeros(3), np.zeros(3)

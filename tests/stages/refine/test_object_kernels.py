@@ -121,10 +121,10 @@ def test_wrenches_are_sums_over_the_contacts() -> None:
     carried, rng = Carried(2), np.random.default_rng(0)
     points, forces = carried.points / LENGTH, carried.forces / WEIGHT
     total = rng.normal(size=6)
-    found = numbers(body.wrench(3), {"wrench": total, "point": points[0], "force": forces[0]}, {})
+    found = numbers(body.wrench(3, False), {"wrench": total, "point": points[0], "force": forces[0]}, {})
     np.testing.assert_allclose(found["sum"], carried.wrench(carried.points[0], carried.forces[0]) - total, atol=1e-12)
     ends = {"point0": points[0], "force0": forces[0], "point1": points[1], "force1": forces[1]}
-    found = numbers(body.middle_torque(3), {"middle_torque": total[:3], **ends}, {})
+    found = numbers(body.middle_torque(3, False), {"middle_torque": total[:3], **ends}, {})
     halfway = carried.wrench(carried.points.mean(axis=0), carried.forces.mean(axis=0))[3:]
     np.testing.assert_allclose(found["sum"], halfway - total[:3], atol=1e-12)
 
@@ -148,11 +148,11 @@ def test_a_second_set_of_forces_holds_the_object_against_a_push(seed: int) -> No
     total = np.r_[alone.sum(axis=0), np.cross(points, alone).sum(axis=0)]
     variables = {"pose": place.pose, "wrench": total, "point": points, "force": pushed}
     external = {"reference": place.parameters["reference"], "external_force": force, "external_torque": torque}
-    found = numbers(body.disturbed(4), variables, external)
+    found = numbers(body.disturbed(4, False), variables, external)
     np.testing.assert_allclose(found["sum"], 0, atol=1e-12)
     np.testing.assert_allclose(found["force_regularisation"], (pushed**2).sum(), rtol=1e-12)
     # The first forces do not hold the push as well: it is what is missing, in the object's frame.
-    found = numbers(body.disturbed(4), {**variables, "force": alone}, external)
+    found = numbers(body.disturbed(4, False), {**variables, "force": alone}, external)
     unheld = place.turn.inv().apply([force, torque]).ravel()
     np.testing.assert_allclose(found["sum"], unheld, atol=1e-12)
 
@@ -416,10 +416,10 @@ def test_derivatives_agree_with_differences() -> None:
     primitives = np.hstack([rng.normal(size=(2, 6)), [[0.2], [0.3]]])
     for kernel, (variables, parameters) in (
         (body.physics(), Carried(0).physics()),
-        (body.wrench(2), ({"wrench": rng.normal(size=6), "point": points[:6], "force": forces[:6]}, {})),
-        (body.middle_torque(2), ({"middle_torque": rng.normal(size=3), **ends}, {})),
+        (body.wrench(2, False), ({"wrench": rng.normal(size=6), "point": points[:6], "force": forces[:6]}, {})),
+        (body.middle_torque(2, False), ({"middle_torque": rng.normal(size=3), **ends}, {})),
         (
-            body.disturbed(4),
+            body.disturbed(4, False),
             (
                 {"pose": place.pose, "wrench": rng.normal(size=6), "point": points, "force": forces},
                 {**reference, "external_force": force, "external_torque": torque},

@@ -102,9 +102,11 @@ def test_the_object_is_kept_off_the_ground_whether_or_not_it_bears_load(loaded: 
 def test_wrenches_are_those_of_all_contacts_at_every_knot(case: MadeUp) -> None:
     found, values = case.constraints(WEIGHTS), case.values
     points, forces = case.points, case.forces
-    wrench = np.hstack([forces.sum(axis=1), np.cross(points, forces).sum(axis=1)])
+    twist = values["twist_torque"]
+    wrench = np.hstack([forces.sum(axis=1), np.cross(points, forces).sum(axis=1) + twist])
     np.testing.assert_allclose(found["wrench.sum"], wrench - values["wrench"], atol=1e-12)
     middle = np.cross((points[1:] + points[:-1]) / 2, (forces[1:] + forces[:-1]) / 2).sum(axis=1)
+    middle = middle + (twist[1:] + twist[:-1]) / 2
     np.testing.assert_allclose(found["middle_torque.sum"], middle - values["middle_torque"], atol=1e-12)
 
 
@@ -117,6 +119,7 @@ def test_disturbances_are_held_at_their_time(loaded: MadeUp) -> None:
         inverse = loaded.turns[k].inv()
         force = forces.sum(axis=0) + inverse.apply(model.disturbance.force[k])
         torque = np.cross(loaded.points[k], forces).sum(axis=0) + inverse.apply(model.disturbance.torque[k])
+        torque = torque + values["twist_torque"][k]
         np.testing.assert_allclose(row, np.r_[force, torque] - values["wrench"][k], atol=1e-12)
 
 

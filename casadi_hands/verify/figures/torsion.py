@@ -1,0 +1,82 @@
+"""Do the fingertips bear the torsional moments that the plan states, and do these act against the spin?
+
+A soft fingertip resists a twist about the contact's normal by at most ρ √(f_n² - f_t²/μ²): ρ the radius of its
+torsional friction, f_n and f_t its normal and tangential force (the limit surface as an ellipse; Howe and Cutkosky,
+1996). Where it turns on the object the moment is at that limit, against the turn.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from casadi_hands.verify.figures.contact import Placements, active_contacts, surface_normals
+from casadi_hands.verify.reading.folder import Folder
+from casadi_hands.verify.report import Figure, worse
+from casadi_hands.verify.trajectory import DENSITY, Trajectory
+
+SPINNING = 0.2
+"""rad/s: a contact that turns quicker on the object slides there."""
+LEAST = 0.05
+"""Of the weight: a limit below which nothing is asked of the moment."""
+
+
+def torsion_figures(folder: Folder, placed: Placements, path: Trajectory) -> list[Figure]:
+    """Return how far moments exceed their limits, how far they fall short of them where contacts spin, and their use.
+
+    All moments are over ρ, so that they are forces, and these over the weight; the last two are shares of the limit.
+    """
+    motion, limits = folder.motion, folder.task.limits
+    if motion.contact_moment is None:
+        return []
+    radius = folder.task.fingertip.torsion
+    excess, use = (0.0, "no contact bears a moment beyond its limit"), (0.0, "no contact that rests bears a moment")
+    most, about = np.zeros(motion.contact_active.shape), np.zeros(motion.contact_active.shape)
+    for k, c in active_contacts(folder):
+        normal = surface_normals(folder, placed, k, c)[0]
+        force, moment = motion.contact_force[k, c], motion.contact_moment[k, c]
+        soft = radius if motion.contact_link[c] != "ground" else 0.0
+        pressing = max(-float(force @ normal), 0.0)
+        across = float(np.linalg.norm(force - (force @ normal) * normal)) / folder.friction(c)
+        most[k, c], about[k, c] = np.sqrt(max(pressing**2 - across**2, 0.0)), float(moment @ normal) / (soft or np.inf)
+        unborne = float(np.linalg.norm(moment - (moment @ normal) * normal)) if soft else float(np.linalg.norm(moment))
+        over = abs(about[k, c]) - most[k, c] + unborne / (soft or 1e-3 * folder.length)
+        at = f"contact '{motion.contact_names[c]}' at {motion.time[k]:.3g} s"
+        excess = worse(excess, (over / folder.weight, f"a moment exceeds what the tip bears by {{value}}, at {at}"))
+    stray = np.abs(motion.contact_moment[~motion.contact_active]).max(initial=0.0)
+    excess = worse(
+        excess, (float(stray) / (folder.weight * folder.length), "a contact that is not active has a moment")
+    )
+    short = (0.0, "no contact spins")
+    for contact, name in enumerate(motion.contact_names):
+        if motion.contact_link[contact] == "ground":
+            continue
+        spins = spin_rates(folder, path, contact)
+        for k in map(int, np.flatnonzero(motion.contact_active[:-1, contact])):
+            limit, moment = (float(values[k : k + 2, contact].mean()) for values in (most, about))
+            where = f"contact '{name}' at {motion.time[k]:.3g} s"
+            if limit < LEAST * folder.weight:
+                continue
+            if abs(spins[k]) > SPINNING:
+                off = abs(moment / limit + np.sign(spins[k]))
+                words = f"the moment of {where}, which spins, is {{value}} off its limit against the spin"
+                short = worse(short, (off, words))
+            elif abs(spins[k]) < SPINNING / 10:
+                use = worse(use, (abs(moment) / limit, f"{{value}} of the torsional friction is counted on at {where}"))
+    return [
+        Figure("torsion_excess", excess[0], limits.torsion_excess, "weight", excess[1]),
+        Figure("torsion_shortfall", short[0], limits.torsion_shortfall, "share", short[1]),
+        Figure("torsion_use", use[0], None, "share", use[1]),
+    ]
+
+
+def spin_rates(folder: Folder, path: Trajectory, contact: int) -> np.ndarray:
+    """Return how fast (S - 1,) the object turns against what it touches, rad/s, about its outward normal."""
+    motion = folder.motion
+    ends = np.arange(0, len(path.time), DENSITY)
+    ours, theirs = (path.placed[body][0][ends] for body in ("object", motion.contact_link[contact]))
+    relative = Rotation.from_matrix(np.einsum("sba,sbc->sac", theirs, ours))
+    turned = (relative[:-1].inv() * relative[1:]).as_rotvec()
+    normals = np.array([folder.object.normal(point) for point in motion.contact_point_object[:-1, contact]])
+    rates: np.ndarray = np.sum(turned * normals, axis=1) / np.diff(motion.time)
+    return rates
