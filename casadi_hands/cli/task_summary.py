@@ -81,7 +81,8 @@ def _links(task: Task) -> str:
     hand, motor = task.hand, task.actuator
     low, high = (1e3 * length for length in hand.link_length)
     lower, upper = hand.joint_limits
-    motors = f"motors of {motor.torque:g} N·m and {motor.speed:g} rad/s" if motor else "motors without limits"
+    most = [f"{value:g} {unit}" for value, unit in ((motor.torque, "N·m"), (motor.speed, "rad/s")) if value]
+    motors = f"motors of {motor.stiffness:g} N·m/rad, {'at most ' + ' and '.join(most) if most else 'without limits'}"
     sizes = f"radius {1e3 * hand.link_radius:.4g} mm, {low:.4g} to {high:.4g} mm long"
     return f"{sizes}; joints {lower:g} to {upper:g} deg; {motors}"
 

@@ -58,10 +58,10 @@ def friction_reason(model: Model, floating: Floating) -> Reason | None:
 
 def torque_reason(model: Model, design: Result) -> Reason | None:
     """Whether holding the object as in a design's motion takes more torque than the motors have."""
-    if design.task.actuator is None or design.hand is None:
+    given = design.task.actuator.torque
+    if given is None or design.hand is None:
         return None
     load = least_torque(model, design)
-    given = design.task.actuator.torque
     if load is None or load.torque <= given:
         return None
     who = f"joint finger{load.finger}_joint{load.joint} of finger '{design.hand.fingers[load.finger].name}'"
@@ -75,16 +75,16 @@ def torque_reason(model: Model, design: Result) -> Reason | None:
 
 def speed_reason(model: Model, design: Result) -> Reason | None:
     """Whether a design's motion, which no limit of speed was asked of, is faster than its motors."""
-    actuator, motion, hand = design.task.actuator, design.motion, design.hand
-    if actuator is None or motion is None or hand is None:
+    fastest, motion, hand = design.task.actuator.speed, design.motion, design.hand
+    if fastest is None or motion is None or hand is None:
         return None
     speeds = np.abs(np.diff(motion.joint_angles, axis=0)) / np.diff(motion.time)[:, None]
     k, j = np.unravel_index(int(speeds.argmax()), speeds.shape)
-    if speeds[k, j] <= actuator.speed:
+    if speeds[k, j] <= fastest:
         return None
     what = (
         f"{_with_finger(f'joint {motion.joint_names[j]}', hand)} turns with {speeds[k, j]:.3g} rad/s at "
-        f"{moment(model.schedule, motion.time[k])} in the motion found, and the motors give {actuator.speed:.3g} rad/s"
+        f"{moment(model.schedule, motion.time[k])} in the motion found, and the motors give {fastest:.3g} rad/s"
     )
     return Reason(what, "faster motors (actuator.speed) or slower goals", frozenset(("speed",)))
 
@@ -152,9 +152,9 @@ def motor_remedy(directory: str, design: Result) -> str | None:
 def _with_limit(design: Result, figure: Figure) -> str:
     """A figure's finding and limit; of motors in their own units too, and with the finger's name."""
     text = figure.text if design.hand is None else _with_finger(figure.text, design.hand)
-    actuator = design.task.actuator
-    if actuator is not None and figure.name in ("torque", "speed"):
-        given, unit = (actuator.torque, "N·m") if figure.name == "torque" else (actuator.speed, "rad/s")
+    given = {"torque": design.task.actuator.torque, "speed": design.task.actuator.speed}.get(figure.name)
+    if given is not None:
+        unit = "N·m" if figure.name == "torque" else "rad/s"
         text += f", {figure.value * given:.3g} {unit} of {given:.3g} {unit}"
     return text if figure.limit is None else f"{text}, where the limit is {show(figure.limit, figure.unit)}"
 

@@ -6,8 +6,8 @@ Choices a reader of the file should know:
   ``palm_target``: whoever replays the motion moves the target. A mocap palm alone would have no velocity in the
   solver's eyes, and friction would hold the object back.
 - **Contact.** Elliptic cones, four dimensions. The task's friction holds wherever the object touches the hand, the
-  ground's wherever anything touches the ground. Fingertips are soft: torsional friction is that of a patch with 0.3
-  of the link's radius, (2/3)·μ·patch, and the contact gives over 2 % of the object's size. Creep, an artefact of
+  ground's wherever anything touches the ground. Fingertips are soft: they have the task's torsional friction, and the
+  contact gives over 2 % of the object's size. Creep, an artefact of
   MuJoCo's regularised friction, is held down by ``impratio`` and the no-slip pass.
 - **Motors.** See `casadi_hands.problem.motors`; torque is limited to the hand's effort. The hand carries its own weight
   (``gravcomp``), as a controller that knows its hand does. Targets are not clamped, so that a feed-forward torque can
@@ -47,7 +47,6 @@ if TYPE_CHECKING:
     from casadi_hands.task import Ground, Task
 
 _TIME_STEP = 0.001  # s
-_PATCH = 0.3  # radius of a fingertip's contact patch, of the link's radius
 _SOFTNESS = 0.02  # depth over which a contact stiffens, of the characteristic length
 _STILL = 1e-9  # a palm that moves less, relative to its size (or in its quaternion), stands still
 
@@ -75,7 +74,7 @@ def scene_mjcf(task: Task, hand: Hand, motion: Motion) -> str:
     if task.ground is not None:
         _add_ground(world, task.ground, task.object.characteristic_length)
     _add_hand(world, task, hand, motion, motors, moves)
-    _add_object(world, task, hand, motion)
+    _add_object(world, task, motion)
     contact = SubElement(root, "contact")
     for first, second in neighbours(hand):
         SubElement(contact, "exclude", body1=first, body2=second)
@@ -128,10 +127,9 @@ def _add_settings(root: Element, task: Task) -> None:
     SubElement(SubElement(root, "default"), "geom", geom)
 
 
-def _friction(task: Task, hand: Hand, coefficient: float) -> str:
-    """Sliding, torsional and rolling coefficient of a contact with a soft fingertip."""
-    radius = max((link.radius for finger in hand.fingers for link in finger.links), default=0.0)
-    return numbers((coefficient, 2 / 3 * coefficient * _PATCH * radius, 0.0))
+def _friction(task: Task) -> str:
+    """Sliding, torsional and rolling coefficient of a contact with a fingertip."""
+    return numbers((task.friction, task.fingertip.torsion, 0.0))
 
 
 def _add_ground(world: Element, ground: Ground, spacing: float) -> None:
@@ -153,7 +151,7 @@ def _add_ground(world: Element, ground: Ground, spacing: float) -> None:
     )
 
 
-def _add_object(world: Element, task: Task, hand: Hand, motion: Motion) -> None:
+def _add_object(world: Element, task: Task, motion: Motion) -> None:
     """Add the free object at its first pose; its friction takes precedence over the hand's."""
     start = {"pos": numbers(motion.object_position[0]), "quat": numbers(motion.object_orientation[0])}
     body = SubElement(world, "body", start, name="object")
@@ -161,7 +159,7 @@ def _add_object(world: Element, task: Task, hand: Hand, motion: Motion) -> None:
     item = task.object
     _add_inertial(body, Inertial(item.mass, np.asarray(item.center_of_mass), np.asarray(item.inertia)))
     for k, shape in enumerate(item.shapes):
-        geom = {"name": f"object{k}", "priority": "1", "friction": _friction(task, hand, task.friction)}
+        geom = {"name": f"object{k}", "priority": "1", "friction": _friction(task)}
         for solid in shape.body.solids():
             _add_solid(body, geom, solid, OBJECT_COLOR)
 
@@ -175,7 +173,7 @@ def _add_hand(world: Element, task: Task, hand: Hand, motion: Motion, motors: tu
     if moves:
         SubElement(palm, "freejoint", name="palm")
     _add_inertial(palm, palm_inertial(hand))
-    friction = _friction(task, hand, task.friction)
+    friction = _friction(task)
     SubElement(
         palm,
         "geom",

@@ -96,7 +96,7 @@ def largest_torque(design: Design) -> float:
         return math.inf
     # A share of the actuator's torque where the task names one.
     actuator = design.task.actuator
-    return float(figure["value"]) * (actuator.torque if actuator else 1.0)
+    return float(figure["value"]) * (actuator.torque or 1.0)
 
 
 def _share_left(name: str, figure: Mapping[str, Any]) -> float | None:

@@ -74,8 +74,8 @@ def _motor_problems(folder: Folder, path: Trajectory) -> list[str]:
     for column, name in enumerate(motion.joint_names):
         joint = folder.joints[name]
         for word, has, needs, unit, of_motor in (
-            ("effort", joint.effort, torques[column], "N·m", motor.torque if motor else None),
-            ("velocity", joint.velocity, speeds[column], "rad/s", motor.speed if motor else None),
+            ("effort", joint.effort, torques[column], "N·m", motor.torque),
+            ("velocity", joint.velocity, speeds[column], "rad/s", motor.speed),
         ):
             if of_motor is not None and abs(has - of_motor) > ROUNDED * of_motor:
                 theirs = f"the task's motor's {of_motor:.4g}"

@@ -11,8 +11,6 @@ from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.reading.scene_file import Scene, SceneBody
 from casadi_hands.verify.reading.stored import same
 
-PATCH = 0.2
-"""Torsional friction of a soft fingertip over sliding friction and link radius: (2/3) × a patch of 0.3 radii."""
 LONGEST_STEP = 0.005
 """s of the simulation: contacts stiffen within about 10 ms."""
 EXACT = 1e-6
@@ -69,9 +67,8 @@ def _world_problems(folder: Folder, scene: Scene) -> list[str]:
                 problems.append(
                     f"the friction of {folder.call(name)} is {slides:g}, in task.yaml {folder.task.friction:g}"
                 )
-            most = PATCH * folder.task.friction * folder.task.hand.link_radius * (1 + EXACT)
-            if not (0.0 <= twists <= most and rolls == 0.0):
-                problems.append(f"{folder.call(name)} resists turning or rolling more than a soft fingertip does")
+            if not same(twists, folder.task.fingertip.torsion) or rolls != 0.0:
+                problems.append(f"{folder.call(name)} does not resist turning and rolling as the task's fingertips do")
     return problems
 
 
@@ -182,6 +179,9 @@ def _servo_problems(folder: Folder, scene: Scene) -> list[str]:
         joint = folder.joints.get(servo.joint)
         if joint is not None and not np.allclose(servo.limits, [-joint.effort, joint.effort], rtol=EXACT, atol=0.0):
             problems.append(f"the torque of joint {servo.joint} is not limited to its effort in hand.urdf")
+        if not same(servo.stiffness, folder.task.actuator.stiffness):
+            due = folder.task.actuator.stiffness
+            problems.append(f"the motor of joint {servo.joint} has {servo.stiffness:.4g} N·m/rad, the task's {due:.4g}")
         if servo.damping < 0.0:
             problems.append(f"the actuator of joint {servo.joint} drives itself: its kv is {servo.damping:.4g}")
     return problems
