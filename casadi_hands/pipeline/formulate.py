@@ -21,8 +21,8 @@ from casadi_hands.nlp.program import Program
 from casadi_hands.nlp.program_folder import save_program
 from casadi_hands.nlp.solver import Solve, keep_solves
 from casadi_hands.pipeline.certify import refinable
+from casadi_hands.pipeline.margins import margins_for
 from casadi_hands.pipeline.record import STAGES, Progress, Record
-from casadi_hands.pipeline.refiner import AMPLE
 from casadi_hands.pipeline.steps import prepare_search, run_floating, run_search, run_whole_hand
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
@@ -181,7 +181,7 @@ def _refined(record: Record, model: Model, whole: WholeHand, homotopy: float) ->
     """The first refinement of a hand: its last step."""
     continuation = Continuation(model, whole.contacts, tuple(f.joints for f in whole.fingers), whole.active)
     with record.stage("refine", "the first refinement"), keep_solves() as solves:
-        runs = continuation.begin(whole, AMPLE, homotopy).runs
+        runs = continuation.begin(whole, margins_for(model, whole).ample, homotopy).runs
     # Hard constraints, which are the last step, may be followed by solves that look for the nearest exact motion.
     knots = len(continuation.sparse.model.schedule.samples)
     step = f"{runs[-1].what} on {knots} knots" + (f" at homotopy {homotopy:.2g}" if homotopy < 1 else "")

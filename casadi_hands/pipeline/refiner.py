@@ -12,6 +12,7 @@ from casadi_hands.diagnosis.reason import Reason
 from casadi_hands.diagnosis.refinement import own_reasons, refined_reason
 from casadi_hands.export.design import Design
 from casadi_hands.pipeline.judge import Judge
+from casadi_hands.pipeline.margins import SMALL, margins_for
 from casadi_hands.pipeline.record import Record, rank_of
 from casadi_hands.pipeline.steps import adopt
 from casadi_hands.problem.hand_motion import WholeHand
@@ -25,9 +26,6 @@ from casadi_hands.stages.synthesis.algorithm import run_record
 from casadi_hands.verify.report import Audit
 
 Array = NDArray[np.float64]
-AMPLE = Margin()
-SMALL = Margin(friction=0.8, normal_force=0.25)
-LARGE = Margin(normal_force=4.0)  # an error of a sensor or of friction shifts a smaller share of it
 # What an exact motion misses only by how it goes between its samples; then it gets more of them.
 BETWEEN = {"residual", "residual_between", "gap_between", "slip", "penetration", "joint_limit"}
 FINEST = 0.02  # s between samples
@@ -53,7 +51,7 @@ class Refiner:
         self,
         whole: WholeHand,
         short: tuple[Reason, ...],
-        margin: Margin = AMPLE,
+        margin: Margin | None = None,
         near: bool = False,
         homotopy: float = 1.0,
     ) -> tuple[Design, Refined]:
@@ -65,32 +63,34 @@ class Refiner:
         Args:
             whole: the hand and its motion.
             short: what its fingers could not do before.
-            margin: the first to be tried.
+            margin: the first to be tried; by default what suits the hand.
             near: whether the motion is nearly exact already.
             homotopy: the homotopy parameter that its motion goes to: 1 at its goals.
 
         Returns:
             the design, replayed where its files hold, and its refinement.
         """
-        planned = self.record.design
+        planned, margins = self.record.design, margins_for(self.model, whole)
+        margin, largest = margin or margins.ample, margins.larger
         stage = Continuation(self.model, whole.contacts, tuple(f.joints for f in whole.fingers), whole.active)
-        refined = self._refined(stage, whole, margin, near, homotopy)
+        larger = largest if homotopy < 1 else None
+        refined = self._refined(stage, whole, margin, near, homotopy, larger)
         judged, refined, stage = self._between(whole, refined, stage, short, planned)
         if refined.exact and judged.status != "certified" and not stage.passes_through(refined):
             # Where joints barely push, fingers may fold over in an instant: other forces take them another way.
-            margin, which = (AMPLE, "smaller") if refined.margin == LARGE else (LARGE, "larger")
+            margin, which = (margins.ample, "smaller") if refined.margin == largest else (largest, "larger")
             text = f"again with a {which} lower bound on normal forces: {judged.reason}"
             other = self._with_margin(whole, refined, stage, margin, text)
             design, other, halved = self._between(whole, other, stage, short, planned)
             if design.status == "certified":
                 judged, refined, stage = design, other, halved
         judged = self._replayed(judged)
-        if judged.drops and refined.margin != LARGE:
+        if judged.drops and refined.margin != largest:
             text = f"again with a larger lower bound on normal forces: {judged.replay_words}"
-            larger = self._with_margin(whole, refined, stage, LARGE, text)
-            design = self._replayed(self._judged(stage.model, larger, short, planned))
+            firm = self._with_margin(whole, refined, stage, largest, text)
+            design = self._replayed(self._judged(stage.model, firm, short, planned))
             if rank_of(design) < rank_of(judged):
-                return design, larger
+                return design, firm
         return judged, refined
 
     def _between(
@@ -123,7 +123,15 @@ class Refiner:
         with self.record.stage("refine", why):
             return self._attempt(whole, margin, partial(stage.with_margin, refined))
 
-    def _refined(self, stage: Continuation, whole: WholeHand, margin: Margin, near: bool, homotopy: float) -> Refined:
+    def _refined(
+        self,
+        stage: Continuation,
+        whole: WholeHand,
+        margin: Margin,
+        near: bool,
+        homotopy: float,
+        larger: Margin | None,
+    ) -> Refined:
         """The refinement with this margin or, where that is not exact and another may be, with a small one.
 
         Over long motions errors add up, and large normal forces are needed nearly always: they are asked for at once.
@@ -132,7 +140,7 @@ class Refiner:
         first = partial(again, near=near)
         if homotopy < 1:
             again = partial(stage.continue_from, whole, homotopy)
-            first = partial(again, larger=LARGE)
+            first = partial(again, larger=larger)
         with self.record.stage("refine", "the same motion with exact physics, rolling contacts and clearance"):
             refined = self._attempt(whole, margin, first)
         if refined.exact or refined.barely_rolls or margin == SMALL:

@@ -25,7 +25,7 @@ from casadi_hands.pipeline.earlier_motion import (
     stretched,
     turns_at,
 )
-from casadi_hands.pipeline.refiner import AMPLE, LARGE, SMALL
+from casadi_hands.pipeline.margins import SMALL, margins_for
 from casadi_hands.problem.floating_motion import Floating
 from casadi_hands.problem.hand import Hand
 from casadi_hands.problem.hand_motion import WholeHand
@@ -79,8 +79,9 @@ def kept_margin(earlier: Design) -> Margin:
     """
     model = build_model(earlier.task)
     whole = warm_start(earlier, earlier.task, model)
+    margins = margins_for(model, whole)
     if earlier.status != "certified":
-        return AMPLE
+        return margins.ample
     least, use = np.inf, 0.0
     for c in whole.contacts:
         active = whole.active[:, c]
@@ -92,7 +93,9 @@ def kept_margin(earlier: Design) -> Margin:
         across = np.linalg.norm(force - normal[:, None] * inward, axis=1)
         least = min(least, float((normal / asked[bearing]).min()))
         use = max(use, float((across / (model.friction * normal)).max()))
-    kept = (m for m in (LARGE, AMPLE) if least >= _NEARLY * m.normal_force and _NEARLY * use <= m.friction)
+    kept = (
+        m for m in (margins.larger, margins.ample) if least >= _NEARLY * m.normal_force and _NEARLY * use <= m.friction
+    )
     return next(kept, SMALL)
 
 

@@ -1,0 +1,47 @@
+"""How firmly a hand is to grip: as much as errors of its joints take away, and no more.
+
+A firm grip keeps an object that errors push about, and asks for stiff joints: what forces do when contacts roll and
+levers turn grows with them. So the least normal force follows from the motors: where joints are held by K and their
+sensors are off by a little, a fingertip presses that much times K less.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from casadi_hands.problem.hand_motion import WholeHand
+from casadi_hands.problem.model import Model
+from casadi_hands.problem.placement import forces_of_joint_errors
+from casadi_hands.stages.refine.values import Margin
+
+SENSOR = np.deg2rad(0.75)  # error of a joint's sensor that must not take a finger off the object
+WEAKEST, FIRMEST = 0.3, 6.0  # weights, of ample lower bounds on the normal force
+FIRMER = 2.0  # times that
+SURER = 0.4  # share of the friction that may be used, where errors are to take less of it
+SMALL = Margin(friction=0.8, normal_force=0.25)
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Margins for one hand.
+
+    Attributes:
+        ample: to begin with.
+        larger: for where replays drop the object.
+    """
+
+    ample: Margin
+    larger: Margin
+
+
+def margins_for(model: Model, whole: WholeHand) -> Margins:
+    """Margins for a hand, by what errors of its joints do to its fingers' normal forces at most samples."""
+    changes = [0.0]
+    for i, contact in enumerate(whole.contacts):
+        touching = whole.active[:, contact]
+        if touching.any():
+            changes.append(float(np.median(forces_of_joint_errors(model, whole, i, SENSOR)[touching])))
+    ample = Margin(normal_force=round(float(np.clip(max(changes), WEAKEST, FIRMEST)), 2))
+    return Margins(ample, replace(ample, friction=SURER, normal_force=FIRMER * ample.normal_force))
