@@ -110,8 +110,9 @@ def disturbance_figure(folder: Folder, placed: Placements) -> Figure:
     """Return the smallest wrench that the grasp cannot resist at some sample, force over m·g and torque over m·g·l.
 
     After Ferrari and Canny: the wrenches that active contacts can exert are the convex hull of zero and of the edges of
-    their friction pyramids (inscribed), where all normal forces together are at most ``RESERVE`` times the largest sum
-    in the plan. The radius is the distance from the wrench that the plan exerts to the hull's nearest face.
+    their friction pyramids (inscribed), the torsion of soft fingertips among them, where all normal forces together are
+    at most ``RESERVE`` times the largest sum in the plan. The radius is the distance from the wrench that the plan
+    exerts to the hull's nearest face.
     """
     normals = np.zeros(len(folder.motion.time))
     for k, c in active_contacts(folder):
@@ -141,7 +142,7 @@ def disturbance_radius(edges: np.ndarray, exerted: np.ndarray) -> float:
 
 def _cones(folder: Folder, placed: Placements, k: int, budget: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the pyramids' edges (N, 6) at full budget and the exerted wrench (6,), nondimensional, at one sample."""
-    edges, exerted = [], np.zeros(6)
+    edges, exerted, soft = [], np.zeros(6), folder.task.fingertip.torsion / folder.length
     turns = 2 * np.pi * np.arange(EDGES) / EDGES
     for c in np.flatnonzero(folder.motion.contact_active[k]):
         inward = -surface_normals(folder, placed, k, int(c))[0]
@@ -150,6 +151,12 @@ def _cones(folder: Folder, placed: Placements, k: int, budget: float) -> tuple[n
         sideways = np.outer(np.cos(turns), across[0]) + np.outer(np.sin(turns), across[1])
         forces = budget * (inward + folder.friction(int(c)) * sideways)
         edges.append(np.hstack([forces, np.cross(arm, forces)]))
+        if soft and folder.motion.contact_link[c] != "ground":  # pressing alone, a fingertip also resists a twist
+            pressed = budget * np.concatenate([inward, np.cross(arm, inward)])
+            twist = np.append(np.zeros(3), soft * budget * inward)
+            edges.append(np.array([pressed + twist, pressed - twist]))
         force = folder.motion.contact_force[k, c] / folder.weight
         exerted += np.concatenate([force, np.cross(arm, force)])
+        if folder.motion.contact_moment is not None:
+            exerted[3:] += folder.motion.contact_moment[k, c] / (folder.weight * folder.length)
     return (np.vstack(edges) if edges else np.zeros((0, 6))), exerted
