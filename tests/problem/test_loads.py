@@ -21,6 +21,7 @@ def ball(
     friction: float = 0.4,
     more: str = "",
     height: float = 0.2,
+    torsion: float = 0.0,
 ) -> Task:
     """A ball that stays where it is for a second; ``contacts`` in radii."""
     fingers = ", ".join(f"f{i}: {{touches: {[RADIUS * x for x in at]}}}" for i, at in enumerate(contacts))
@@ -32,6 +33,7 @@ motion: [{{at: 0, position: [0, 0, {height}]}}, {{at: 1, position: [0, 0, {heigh
 fingers: {{{fingers}}}
 gravity: [0, 0, {-9.81 if gravity else 0}]
 friction: {friction}
+fingertip: {{torsion: {torsion}}}
 {f"perturbations: [{{from: 0.3, to: 0.6, {push}}}]" if push else ""}
 {more}
 """
@@ -119,7 +121,15 @@ def test_what_is_given_is_the_limit() -> None:
     assert build_model(given).force_limit == 12.5
 
 
+def test_a_torque_about_the_line_through_two_contacts_is_borne_by_torsion_alone() -> None:
+    model = build_model(ball(around(2), "torque: [0.6, 0, 0]", torsion=0.002))
+    load = hardest_load(model, 0.0)
+    assert load is not None
+    assert load.least == pytest.approx(0.6 / (2 * 0.002) / WEIGHT, rel=1e-6)
+
+
 def test_what_no_force_bears_says_nothing() -> None:
-    model = build_model(ball(around(2), "torque: [0.6, 0, 0]"))  # about the line through both contacts
+    # About the line through both contacts, which are hard points.
+    model = build_model(ball(around(2), "torque: [0.6, 0, 0]"))
     assert hardest_load(model, 0.0) is None
     assert model.force_limit == USUAL_FORCE
