@@ -36,10 +36,12 @@ class Progress:
 
 
 def rank_of(design: Design) -> tuple[float, ...]:
-    """How far a judged design is from certified, best first: limits missed by the files, in replays, and drops."""
+    """How far a judged design is from certified: limits missed by files, in replays, drops, stiffness it asks for."""
     in_replays = design.missed_in_replays
     missed = len(design.missed) - len(in_replays)
-    return (missed, math.inf, math.inf) if design.drops is None else (missed, len(in_replays), design.drops)
+    stiffness = design.certificate.get("least_stiffness", {}).get("value")
+    played = (math.inf, math.inf) if design.drops is None else (len(in_replays), design.drops)
+    return missed, *played, math.inf if stiffness is None else stiffness
 
 
 class Record:

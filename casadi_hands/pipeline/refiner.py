@@ -58,7 +58,7 @@ class Refiner:
         """Refine one hand with a margin, and with others where that fails.
 
         A small one where no motion is exact, another lower bound on normal forces where the audit refuses one that is,
-        and a larger one where a replay drops.
+        and a larger one where replays drop the object or miss their limits.
 
         Args:
             whole: the hand and its motion.
@@ -85,7 +85,7 @@ class Refiner:
             if design.status == "certified":
                 judged, refined, stage = design, other, halved
         judged = self._replayed(judged)
-        if judged.drops and refined.margin != largest:
+        if (judged.drops or judged.missed_in_replays) and refined.margin != largest:
             text = f"again with a larger lower bound on normal forces: {judged.replay_words}"
             firm = self._with_margin(whole, refined, stage, largest, text)
             design = self._replayed(self._judged(stage.model, firm, short, planned))

@@ -79,7 +79,7 @@ GRIP = Term(
     "Normal force, which stiffness has to make up for",
     "",
     "m·g",
-    weights={"refine": Weight(0.02, "knot")},
+    weights={"refine": Weight(0.03, "knot")},
 )
 FRICTION_MARGIN = Term(
     "friction_margin",

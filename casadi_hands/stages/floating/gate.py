@@ -75,11 +75,15 @@ def passes_gate(model: Model, values: Mapping[str, Array], pivots: bool = False)
         all_hold = np.linalg.matrix_rank(grasp_map(points), 1e-6)
         if np.linalg.matrix_rank(grasp, 1e-6) < (min(all_hold, _PIVOT_RANK) if pivots else all_hold):
             return False
-        edges = friction_edges(inward_normals(points[active], list(compress(bodies, active))), friction[active])
+        inward = inward_normals(points[active], list(compress(bodies, active)))
+        edges = friction_edges(inward, friction[active])
         wrenches = np.vstack([edges, np.zeros((3, edges.shape[1]))])
         for i, point in enumerate(points[active]):
             span = slice(i * EDGES, (i + 1) * EDGES)
             wrenches[3:, span] = np.cross(point[None, :], edges[:, span].T).T
-        if nonnegative_fit(wrenches, needed)[1] > _GATE:
+        soft = active[: model.contacts].sum() if model.torsion else 0
+        pressed = np.vstack([inward[:soft].T, np.cross(points[active][:soft], inward[:soft]).T])
+        twist = np.vstack([np.zeros((3, soft)), model.torsion * inward[:soft].T])
+        if nonnegative_fit(np.hstack([wrenches, pressed + twist, pressed - twist]), needed)[1] > _GATE:
             return False
     return True

@@ -33,6 +33,8 @@ HOPELESS = 0.1  # lengths of slip: where stiff penalties leave more, rolling is 
 # Of the first penalty's slip: where the stiff one leaves more than hopeless, but less than this, it goes on.
 FALLING = 0.5
 WEIGHTS = {term.name: single(term.weights["refine"].default) for term in terms_of("refine")}
+# Of soft fingertips: one that spins resists nothing more, so that errors turn the object as far as they like.
+SOFT = {"spin": 3.0}
 STIFF = {"slip": 100.0, "passive_force": 30.0}
 STIFFER = STIFF | {"slip": 1000.0}
 HARD = {"slip": 100.0}  # its tolerance is there for where it is needed

@@ -24,7 +24,7 @@ from casadi_hands.stages.own_terms import own_weights
 from casadi_hands.stages.refine.inter_knot import pass_through
 from casadi_hands.stages.refine.problem import RefineProblem
 from casadi_hands.stages.refine.result import Refined, Run, Worst
-from casadi_hands.stages.refine.settings import ACCEPTED, FALLING, GOOD, HOPELESS, MET, RESTORATION, Step
+from casadi_hands.stages.refine.settings import ACCEPTED, FALLING, GOOD, HOPELESS, MET, RESTORATION, SOFT, Step
 from casadi_hands.stages.refine.values import Margin, RefineValues
 
 
@@ -105,7 +105,7 @@ class RefineStage:
         slips: dict[str, float] = {}
         most = 0.0
         for what, given_weights, options in steps:
-            weights = given_weights | own_weights(self.model, "refine")
+            weights = self._all_weights(given_weights)
             most, before = max(slips.values(), default=0.0), most
             if what == "stiffer penalty" and not HOPELESS < most < FALLING * before:
                 continue
@@ -147,9 +147,13 @@ class RefineStage:
 
     def costs(self, step: Step, start: WholeHand, margin: Margin) -> dict[str, float]:
         """The weighted terms of a motion, as a step weights them."""
-        weights = step[1] | own_weights(self.model, "refine")
+        weights = self._all_weights(step[1])
         parameters = self.given.parameters(start, margin) | self._weighted(weights)
         return self.solver.evaluate(self.given.start(start), parameters)
+
+    def _all_weights(self, weights: Mapping[str, float]) -> dict[str, float]:
+        """A step's weights, those of soft fingertips, and those of a person's own terms."""
+        return {**weights, **(SOFT if self.model.torsion else {}), **own_weights(self.model, "refine")}
 
     def _weighted(self, weights: Mapping[str, float]) -> dict[str, ArrayLike]:
         return {f"weight.{term}": weights[term] / self.given.knots for term in self.problem.terms}
