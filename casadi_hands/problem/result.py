@@ -58,6 +58,11 @@ class Result:
         return int(first["of"] if first["dropped_as_planned"] else first["dropped"])
 
     @property
+    def replay_angle(self) -> float:
+        """Degrees by which the object is turned from a goal at most in the replay as planned; 0 where there was none."""
+        return float(self.certificate.get("replay_angle", {}).get("value") or 0.0)
+
+    @property
     def replay_words(self) -> str:
         """What the replays said, in a line; empty where there were none."""
         if not self.replays:

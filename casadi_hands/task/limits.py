@@ -61,5 +61,5 @@ class Limits(Section):
         description="Distance of object (or tool) and any goal when the design is replayed as planned, m.",
         json_schema_extra={"default": "the larger of 2 mm and 5 % of the characteristic length"},
     )
-    replay_angle: NonNegative = Field(default=3.0, description="Angle between object and any goal then, degrees.")
+    replay_angle: NonNegative = Field(default=5.0, description="Angle between object and any goal then, degrees.")
     replay_dropped: NonNegative = Field(default=0.05, description="Share of perturbed replays that drop the object.")

@@ -175,7 +175,7 @@ def test_friction_is_the_tasks():
     assert held
     for contact in held:
         assert contact.friction[0] == pytest.approx(0.5)
-        assert contact.friction[2] == pytest.approx(2 / 3 * 0.5 * 0.3 * 0.008)
+        assert contact.friction[2] == pytest.approx(2 / 3 * 0.5 * 0.3 * 0.13 * 0.06)  # of the task's own links
         assert contact.dim == 4
 
 
@@ -219,7 +219,7 @@ def test_a_moving_palm_follows_its_target():
     assert data.joint("palm").qvel[2] == pytest.approx(0.2, rel=0.05)
 
 
-def test_a_task_scaled_in_length_and_gravity_gets_scaled_motors():
+def test_a_task_scaled_in_length_gravity_and_stiffness_has_scaled_motors():
     hand, motion = example_hand(), example_motion()
 
     def ten_times(link):
@@ -229,7 +229,7 @@ def test_a_task_scaled_in_length_and_gravity_gets_scaled_motors():
     fingers = tuple(replace(finger, links=tuple(map(ten_times, finger.links))) for finger in hand.fingers)
     large = replace(hand, fingers=fingers, density=hand.density / 1000)
     task = example_task()
-    heavy = parse_task(TASK + "gravity: [0, 0, -98.1]\n")
+    heavy = parse_task(TASK + "gravity: [0, 0, -98.1]\nactuator: {stiffness: 100}\n")
     small = mujoco.MjModel.from_xml_string(scene_mjcf(task, hand, motion))
     big = mujoco.MjModel.from_xml_string(scene_mjcf(heavy, large, motion))
     assert big.actuator_gainprm[:, 0] == pytest.approx(100 * small.actuator_gainprm[:, 0])

@@ -15,7 +15,8 @@ from casadi_hands.pipeline import certify
 from casadi_hands.pipeline import refiner as refiner_module
 from casadi_hands.pipeline.certify import Certifier
 from casadi_hands.pipeline.record import Record
-from casadi_hands.pipeline.refiner import AMPLE, LARGE, Refiner, intervals_to_halve
+from casadi_hands.pipeline.margins import Margins
+from casadi_hands.pipeline.refiner import Refiner, intervals_to_halve
 from casadi_hands.problem.si import build_model
 from casadi_hands.stages.refine.result import Run, Worst
 from casadi_hands.stages.refine.values import Margin
@@ -26,6 +27,7 @@ from tests.pipeline.replayed import replayed
 from tests.stages.example import made_up_solution
 from tests.stages.synthesis.example import ball_target, ball_task, hand, pointing
 
+AMPLE, LARGE = Margin(), Margin(normal_force=4.0)
 Verdict = tuple[
     int, tuple[int, ...], bool
 ]  # limits missed, contacts that cannot meet them, whether it slips hopelessly

@@ -14,7 +14,7 @@ from casadi_hands.export.design import Design
 from casadi_hands.nlp import Options, Solver, SolverError
 from casadi_hands.pipeline import Progress, run, solve
 from casadi_hands.pipeline.record import Record
-from casadi_hands.pipeline.refiner import LARGE, Refiner
+from casadi_hands.pipeline.refiner import Refiner
 from casadi_hands.task import parse_task
 from tests.pipeline.replayed import replayed
 from tests.pipeline.test_warm_start import HELD, earlier, edited, pressing

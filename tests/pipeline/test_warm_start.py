@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from casadi_hands.errors import SolveError
 from casadi_hands.export.design import Design
-from casadi_hands.pipeline.refiner import AMPLE, LARGE, SMALL
+from casadi_hands.pipeline.margins import SMALL, margins_for
 from casadi_hands.pipeline.warm_start import as_floating, kept_margin, warm_start
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.motion import Motion

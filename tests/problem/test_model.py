@@ -208,6 +208,8 @@ def ten_times_larger(name: str) -> Model:
     data = YAML(typ="safe").load(PROBLEMS / name)
     data.setdefault("gravity", [0, 0, -9.81])
     data["limits"] = {**data.get("limits", {}), **{name: 10 * getattr(task.limits, name) for name in LIMITS}}
+    # Torques grow with both, and with them what joints resist a turn with.
+    data["actuator"] = {"stiffness": 100 * task.actuator.stiffness}
     return build_model(parse_task(json.dumps(scaled(data, 10.0))))
 
 

@@ -53,7 +53,7 @@ perturbations:
   - {{from: 0.3, to: 0.9, force: [{0.3 * s}, 0, {-0.5 * s}], torque: [0, {0.004 * s * s}, 0]}}
   - {{from: 0.5, to: 0.7, force: [0, {0.2 * s}, 0]}}
 hand: {{link_radius: {0.006 * s}, link_length: [{0.012 * s}, {0.1 * s}], joint_limits: [-80, 85]}}
-actuator: {{torque: {0.05 * s * s}, speed: 6}}
+actuator: {{torque: {0.05 * s * s}, speed: 6, stiffness: {s * s}}}
 limits:
   {{goal_position: {0.0005 * s}, gap: {5e-5 * s}, gap_between: {1e-4 * s}, slip: {2e-4 * s}, penetration: {1e-4 * s}}}
 keyframes_between: 1

@@ -472,10 +472,15 @@ SPOILT = {
         "hand: {joint_limits: [-200, 90]}\nname:",
         "1: hand.joint_limits: given [-200, 90]; allowed: [lower, upper]...",
     ),
-    "motor without speed": (
+    "motor that gives way to everything": (
         "name:",
-        "actuator: {torque: 1}\nname:",
-        "1: actuator.speed: given nothing; allowed: a value, it has no default: Largest speed, rad/s.",
+        "actuator: {stiffness: 0}\nname:",
+        "1: actuator.stiffness: given 0; allowed: a number above 0",
+    ),
+    "fingertip that helps a twist": (
+        "name:",
+        "fingertip: {torsion: -0.001}\nname:",
+        "1: fingertip.torsion: given -0.001; allowed: a number of at least 0",
     ),
     "unknown weight": (
         "name:",
