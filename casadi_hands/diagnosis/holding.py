@@ -21,7 +21,7 @@ from casadi_hands.problem.loads import HELD, hardest_load
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.result import Result
 from casadi_hands.stages.floating.gate import needed_wrenches
-from casadi_hands.statics.grasp import grasp_map, spread_forces
+from casadi_hands.statics.grasp import grasp_map, spread_forces, torsion_edges
 from casadi_hands.statics.joints import structural_projector
 from casadi_hands.statics.programmes import least_largest, least_largest_solution, nonnegative_fit
 from casadi_hands.terms.finger import NULL_SPACE_DAMPING
@@ -69,11 +69,14 @@ def holdings(model: Model, floating: Floating, friction: float | None = None) ->
     ):
         normals = inward_normals(points[active], list(compress(model.touched, active)))
         forces = spread_forces(normals, mu[active])
-        wrenches = grasp_map(points[active]) @ forces
+        fingers = int(active[: model.contacts].sum())
+        twists = torsion_edges(points[active][:fingers], normals[:fingers], model.torsion)
+        wrenches = np.hstack([grasp_map(points[active]) @ forces, twists])
         made = wrenches @ nonnegative_fit(wrenches, needed)[0]
         # Normal forces: every edge has one of unit length.
         count = int(active.sum())
-        normal = np.asarray(np.kron(np.eye(count), np.ones(forces.shape[1] // count)), float)
+        each = np.kron(np.eye(count), np.ones(forces.shape[1] // count))
+        normal = np.hstack([each, np.tile(np.eye(count, fingers), twists.shape[1] // max(fingers, 1))])
         found.append(Holding(needed - made, least_largest(normal, wrenches, made)))
     return tuple(found)
 

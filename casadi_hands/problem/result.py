@@ -71,6 +71,6 @@ class Result:
         planned = "drops the object as planned"
         if not first["dropped_as_planned"]:
             planned = f"{first['mean']['mm']:.2g} mm and {first['mean']['degrees']:.2g}° off plan on average"
-        dropping = [name for name, each in first["perturbed"].items() if each["dropped"]]
+        dropping = [name for name, each in first.get("perturbed", {}).items() if each["dropped"]]
         which = f" ({', '.join([*dropping[:3], *(['…'] if len(dropping) > 3 else [])])})" if dropping else ""
         return f"in MuJoCo {planned}, {first['dropped']} of {first['of']} perturbed replays drop it{which}"

@@ -26,6 +26,21 @@ def friction_edges(normals: Array, friction: Array, count: int = EDGES) -> Array
     return edges
 
 
+def torsion_edges(points: Array, normals: Array, radius: float) -> Array:
+    """(6, 2C) wrenches of soft fingertips that press with 1 along their normals (C, 3) and twist, either way.
+
+    Args:
+        points: (C, 3) of the contacts.
+        normals: (C, 3), inward.
+        radius: of their torsional friction; the columns are none where it is 0.
+    """
+    if not radius:
+        return np.zeros((6, 0))
+    pressed = np.vstack([normals.T, np.cross(points, normals).T])
+    twist = np.vstack([np.zeros((3, len(points))), radius * normals.T])
+    return np.hstack([pressed + twist, pressed - twist])
+
+
 def spread_forces(normals: Array, friction: Array, count: int = EDGES) -> Array:
     """(3C, C·count): contact forces one above the other for each edge of the friction cones about normals (C, 3)."""
     edges = friction_edges(normals, friction, count)

@@ -92,14 +92,21 @@ NO_SLIP = Constraint(
     ("slip", *_GAP, *_BALANCE),
 )
 
-SPIN_RATE = Constraint("spin_rate", "the turn of object against fingertip about the contact's normal", "speed")
+SPIN_RATE = Constraint(
+    "spin_rate",
+    "the turn of object against fingertip about the contact's normal",
+    "speed",
+    "turn with the object",
+    _PACE,
+    (*_GAP, "slip"),
+)
 TORSION_CONE = Constraint(
     "torsion_cone",
     "(f_t / μ)² + (m / ρ)² <= f_n²",
     "",
     "hold against a twist and a pull at once",
     _HOLDING,
-    ("torsion",),
+    ("torsion_excess",),
 )
 TORSION_LAW = Constraint(
     "torsion_law",
@@ -107,7 +114,7 @@ TORSION_LAW = Constraint(
     "force",
     "resist a twist as its tip does",
     "a harder fingertip (fingertip.torsion: 0), or more joints (search.max_joints)",
-    ("torsion_use", *_BALANCE),
+    ("torsion_shortfall", *_BALANCE),
 )
 
 # The same under a disturbance.

@@ -14,7 +14,7 @@ from casadi_hands.task.hand import Actuator
 from casadi_hands.verify import Perturbation, Replay, Replays
 from casadi_hands.verify.replays.replay import GoalError
 from casadi_hands.verify.report import Audit, Figure
-from tests.diagnosis.test_holding import WEIGHT, still, upright
+from tests.diagnosis.test_holding import WEIGHT, jerked, still, upright
 from tests.export.example import example_design
 
 
@@ -46,11 +46,7 @@ def test_a_grasp_that_cannot_hold_is_told_with_what_is_missing() -> None:
 def test_a_missing_torque_is_told_in_its_unit() -> None:
     # The ball is jerked about the line through both contacts, about which they can make no torque.
     model, floating = still(0.5)
-    floating.pose[:, 4] = [0, 2, 0]
-    spins = model.schedule.spline(1) @ floating.pose - 2 * model.schedule.spline() @ floating.pose
-    spins += model.schedule.spline(-1) @ floating.pose
-    accelerations = spins[model.schedule.keyframe_samples, 4] / model.schedule.step**2
-    torque = 0.4 * 0.1 * 0.03**2 * abs(accelerations).max()  # of a homogeneous ball, N·m
+    torque = jerked(model, floating)
     reason = friction_reason(model, floating)
     assert reason is not None
     assert reason.what.endswith(f" friction 0.5: a torque of {1e3 * torque:.3g} mN·m is missing")

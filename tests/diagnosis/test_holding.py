@@ -31,9 +31,11 @@ keyframes_between: 1
 WEIGHT = 0.1 * 9.81
 
 
-def still(friction: float, right: tuple[float, float, float] = (0, 1, 0)) -> tuple[Model, Floating]:
+def still(
+    friction: float, right: tuple[float, float, float] = (0, 1, 0), torsion: float = 0.0
+) -> tuple[Model, Floating]:
     """The ball at rest; ``right`` is where the right finger touches, in radii."""
-    model = build_model(parse_task(STILL + f"friction: {friction}\n"))
+    model = build_model(parse_task(STILL + f"friction: {friction}\nfingertip: {{torsion: {torsion}}}\n"))
     keyframes, samples = len(model.schedule.keyframes), len(model.schedule.samples)
     pose = np.zeros((keyframes, 6))
     pose[:, 2] = 3
@@ -83,10 +85,34 @@ def test_what_cannot_be_made_is_missing_whole() -> None:
     assert least_friction(model, floating) is None
 
 
+def jerked(model: Model, floating: Floating) -> float:
+    """The torque, N·m, that it takes to jerk the ball about the line through both contacts, as it then is."""
+    floating.pose[:, 4] = [0, 2, 0]
+    spins = model.schedule.spline(1) @ floating.pose - 2 * model.schedule.spline() @ floating.pose
+    spins += model.schedule.spline(-1) @ floating.pose
+    accelerations = spins[model.schedule.keyframe_samples, 4] / model.schedule.step**2
+    return float(0.4 * 0.1 * 0.03**2 * abs(accelerations).max())  # of a homogeneous ball
+
+
+def test_what_turns_the_ball_between_two_soft_fingertips_is_their_torsion() -> None:
+    model, floating = still(0.5, torsion=0.002)
+    pressed = jerked(model, floating) / (2 * 0.002)
+    assert pressed > 0.1 * WEIGHT
+    found = holdings(model, floating)
+    assert all(holding.held for holding in found)
+    # What bears the weight twists nothing. Pyramids have less friction than cones where the ball's turn has no edge.
+    hardest = max(holding.hardest for holding in found) - pressed / WEIGHT
+    assert 1.0 - 1e-6 < hardest < (1.0 + 1e-6) / np.cos(np.pi / 8)
+    assert not all(holding.held for holding in holdings(still(0.5)[0], floating))
+
+
 @pytest.mark.parametrize("right", [(0, 1, 0), (1, 0, 0), (0, 0, 1), (0, np.sin(1), -np.cos(1)), (0.6, 0.8, 0)])
 @pytest.mark.parametrize("friction", [0.1, 0.6])
-def test_it_agrees_with_the_floating_stage_s_gate(right: tuple[float, float, float], friction: float) -> None:
-    model, floating = still(friction, right)
+@pytest.mark.parametrize("torsion", [0.0, 0.001])
+def test_it_agrees_with_the_floating_stage_s_gate(
+    right: tuple[float, float, float], friction: float, torsion: float
+) -> None:
+    model, floating = still(friction, right, torsion)
     held = all(holding.held for holding in holdings(model, floating))
     assert held == passes_gate(model, floating.solution.values)
 

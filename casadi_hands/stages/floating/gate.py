@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from casadi_hands.geometry.contact_points import inward_normals
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.palm_motion import poses_at
-from casadi_hands.statics.grasp import EDGES, friction_edges, grasp_map
+from casadi_hands.statics.grasp import EDGES, friction_edges, grasp_map, torsion_edges
 from casadi_hands.statics.programmes import nonnegative_fit
 
 Array = NDArray[np.float64]
@@ -81,9 +81,8 @@ def passes_gate(model: Model, values: Mapping[str, Array], pivots: bool = False)
         for i, point in enumerate(points[active]):
             span = slice(i * EDGES, (i + 1) * EDGES)
             wrenches[3:, span] = np.cross(point[None, :], edges[:, span].T).T
-        soft = active[: model.contacts].sum() if model.torsion else 0
-        pressed = np.vstack([inward[:soft].T, np.cross(points[active][:soft], inward[:soft]).T])
-        twist = np.vstack([np.zeros((3, soft)), model.torsion * inward[:soft].T])
-        if nonnegative_fit(np.hstack([wrenches, pressed + twist, pressed - twist]), needed)[1] > _GATE:
+        fingers = int(active[: model.contacts].sum())
+        twists = torsion_edges(points[active][:fingers], inward[:fingers], model.torsion)
+        if nonnegative_fit(np.hstack([wrenches, twists]), needed)[1] > _GATE:
             return False
     return True
