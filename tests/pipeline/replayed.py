@@ -19,6 +19,7 @@ def replayed(design: Design, drops: int) -> Design:
         "dropped_as_planned": False,
         "dropped": drops,
         "of": OF,
+        "perturbed": {f"number {k}": {"dropped": k < drops} for k in range(OF)},
     }
     certificate = {**design.certificate, "replay_dropped": {"value": drops / OF, "limit": 0.1, "holds": few}}
     return replace(design, status=status, replays=[entry], certificate=certificate)

@@ -14,8 +14,8 @@ from casadi_hands.export.design import Design
 from casadi_hands.pipeline import certify
 from casadi_hands.pipeline import refiner as refiner_module
 from casadi_hands.pipeline.certify import Certifier
-from casadi_hands.pipeline.record import Record
 from casadi_hands.pipeline.margins import Margins
+from casadi_hands.pipeline.record import Record
 from casadi_hands.pipeline.refiner import Refiner, intervals_to_halve
 from casadi_hands.problem.si import build_model
 from casadi_hands.stages.refine.result import Run, Worst
@@ -228,6 +228,7 @@ def test_what_is_missed_only_between_samples_gets_more_of_them(
         kept = {name: Figure(name, 0.0, 1.0, "m", "") for name in refiner_module.BETWEEN}
         return SimpleNamespace(figures={**kept, missed: Figure(missed, parts.sum(), 1.0, "m", "", by_interval=parts)})
 
+    monkeypatch.setattr(refiner_module, "margins_for", lambda *_: Margins(AMPLE, LARGE))
     monkeypatch.setattr(refiner_module, "Continuation", Once)
     monkeypatch.setattr(Refiner, "_with_margin", lambda *_: SimpleNamespace(exact=False))  # no grip is any better
     monkeypatch.setattr(refiner_module, "resampled", lambda hand, before, after: hand)
@@ -277,6 +278,7 @@ def refine(
 ) -> tuple[Margin, int]:
     """The margin of what is kept and its drops, where designs and drops are judged as told, in this order."""
     judged, dropped = iter(statuses), iter(drops)
+    monkeypatch.setattr(refiner_module, "margins_for", lambda *_: Margins(AMPLE, LARGE))
     monkeypatch.setattr(refiner_module, "Continuation", lambda *_: ways)
     monkeypatch.setattr(Refiner, "_attempt", lambda self, whole, margin, refine: refine(margin=margin))
     monkeypatch.setattr(Refiner, "_judged", lambda self, *_: replace(self.record.design, status=next(judged)))

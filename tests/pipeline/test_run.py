@@ -17,7 +17,7 @@ from casadi_hands.pipeline.record import Record
 from casadi_hands.pipeline.refiner import Refiner
 from casadi_hands.task import parse_task
 from tests.pipeline.replayed import replayed
-from tests.pipeline.test_warm_start import HELD, earlier, edited, pressing
+from tests.pipeline.test_warm_start import HELD, earlier, edited, held_margins, pressing
 from tests.stages.synthesis.example import ball_task
 
 
@@ -70,7 +70,7 @@ def test_a_certified_refinement_of_the_earlier_hand_is_the_result(
     monkeypatch.setattr(run, "_run", never)
     solve(parse_task(edited("[0.115, 0, 0.3] -> [0.115, 0.005, 0.3]")), jobs=1, out=tmp_path / "out", start=folder)
     (call,) = calls
-    assert (call["short"], call["margin"], call["near"]) == ((), LARGE, True)
+    assert (call["short"], call["margin"], call["near"]) == ((), held_margins().larger, True)
     np.testing.assert_allclose(call["motion"].object_position[10], [0.115, 0.005, 0.3], atol=1e-9)
     np.testing.assert_allclose(call["whole"].position[10] * 0.06, [0.115, 0.005, 0.3], atol=1e-9)
     loaded = Design.load(tmp_path / "out")

@@ -10,13 +10,12 @@ from scipy.spatial.transform import Rotation
 
 from casadi_hands.errors import SolveError
 from casadi_hands.export.design import Design
-from casadi_hands.pipeline.margins import SMALL, margins_for
+from casadi_hands.pipeline.margins import SMALL, Margins, margins_for
 from casadi_hands.pipeline.warm_start import as_floating, kept_margin, warm_start
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.motion import Motion
 from casadi_hands.problem.outcome import whole_hand_motion
 from casadi_hands.problem.si import build_model, hand_of
-from casadi_hands.stages.refine.values import Margin
 from casadi_hands.task import Task, parse_task
 from tests.export.example import BASES, HEIGHT, LENGTHS, TASK, example_hand, example_motion
 
@@ -227,19 +226,30 @@ def pressing(normal: float, across: float) -> Motion:
     return replace(motion, contact_force=np.tile(force, (21, 1, 1)))
 
 
+def held_margins() -> Margins:
+    """What is asked of the hand made by hand."""
+    task, start, _ = start_for(HELD)
+    return margins_for(build_model(task), start)
+
+
 @pytest.mark.parametrize(
-    ("normal", "across", "status", "margin"),
+    ("normal", "use", "status", "margin"),
     [
-        (4.1, 0.8, "certified", LARGE),
-        (3.0, 0.6, "certified", AMPLE),
-        (1.5, 0.3, "certified", AMPLE),
-        (1.5, 0.5, "certified", SMALL),  # two thirds of the friction
-        (0.5, 0.1, "certified", SMALL),
-        (0.5, 0.1, "feasible", AMPLE),
+        (2.1, 0.39, "certified", "larger"),
+        (2.1, 0.45, "certified", "ample"),  # more of the friction than the larger leaves
+        (1.9, 0.3, "certified", "ample"),
+        (1.05, 0.45, "certified", "ample"),
+        (1.05, 0.67, "certified", "small"),  # two thirds of the friction
+        (0.9, 0.1, "certified", "small"),
+        (0.9, 0.1, "feasible", "ample"),
+        (3.0, 0.1, "feasible", "ample"),
     ],
 )
-def test_the_margin_that_a_result_keeps_is_kept(normal: float, across: float, status: str, margin: Margin) -> None:
-    assert kept_margin(earlier(motion=pressing(normal, across), status=status)) == margin
+def test_the_margin_that_a_result_keeps_is_kept(normal: float, use: float, status: str, margin: str) -> None:
+    margins = held_margins()
+    normal *= margins.ample.normal_force
+    found = kept_margin(earlier(motion=pressing(normal, 0.5 * use * normal), status=status))
+    assert found == (SMALL if margin == "small" else getattr(margins, margin))
 
 
 def test_what_the_judge_needs_of_the_object_s_motion() -> None:

@@ -475,7 +475,7 @@ SPOILT = {
     "motor that gives way to everything": (
         "name:",
         "actuator: {stiffness: 0}\nname:",
-        "1: actuator.stiffness: given 0; allowed: a number above 0",
+        "1: actuator.stiffness: given 0; allowed: a number greater than 0",
     ),
     "fingertip that helps a twist": (
         "name:",
