@@ -17,6 +17,7 @@ from tests.verify.falsify import (
     both,
     copied,
     edited,
+    links_of,
     only,
     record,
     removed,
@@ -68,11 +69,11 @@ HAND_AGAINST_TASK: Cases = {
     "a finger that floats": (task("link_radius: 0.006", "link_radius: 0.003"), r"above the palm's face, not on it"),
     "other link radii": (task("link_radius: 0.006", "link_radius: 0.007"), r"has a radius of 6 mm, the task 7 mm"),
     "shorter links only": (
-        task("link_length: [0.012, 0.15979455548227217]", "link_length: [0.012, 0.05]"),
+        lambda folder: links_of(folder, 0.012, 0.05),
         r"finger 'one' \(link 1\) is 60\.11 mm long; the task allows 12 to 50 mm",
     ),
     "longer links only": (
-        task("link_length: [0.012, 0.15979455548227217]", "link_length: [0.05, 0.16]"),
+        lambda folder: links_of(folder, 0.05, 0.16),
         r"finger 'one' \(link 0\) is 26\.81 mm long",
     ),
     "one joint a finger": (task("max_joints: 3", "max_joints: 1"), r"finger 'one' has 2 joints; the task allows 1"),
@@ -98,7 +99,7 @@ HAND_AGAINST_TASK: Cases = {
     "speed of zero": (attribute(HAND, JOINT + "/limit", "velocity", "0"), r"velocity limit .*not above zero"),
     "effort below what the motion needs, without a motor": (
         both(
-            task("actuator: {torque: 0.5, speed: 5.0}\n", ""),
+            task("torque: 0.5, speed: 5.0, ", ""),
             edited(HAND, ".//limit", lambda e, p: e.set("effort", "0.05"), every=True),
             edited(SCENE, ".//position", lambda e, p: e.set("forcerange", "-0.05 0.05"), every=True),
             record("hand", "effort", value=0.05),

@@ -21,6 +21,7 @@ from tests.verify.falsify import (
     squeezed,
     task,
     text,
+    tipped,
     whole,
 )
 
@@ -85,11 +86,26 @@ DISTURBANCES: Cases = {
     ),
 }
 
+TORSION: Cases = {
+    "more of the moments": (arrays(contact_moment=lambda a: 1.1 * a), r"a torque of .* that nothing exerts moves"),
+    "moments turned around": (arrays(contact_moment=lambda a: -a), r"a torque of .* that nothing exerts moves"),
+    "no moments": (arrays(contact_moment=None), r"a torque of .* that nothing exerts moves"),
+    "moments of hard fingertips": (
+        lambda folder: tipped(folder, 0.0),
+        r"a moment exceeds what the tip bears by .* at contact 'three' at 0\.5 s",
+    ),
+    "moments of fingertips too hard for them": (
+        lambda folder: tipped(folder, 0.0001),
+        r"a moment exceeds what the tip bears by .* at contact '(one|three)' at ",
+    ),
+}
+
 NO_NUMBERS: Cases = {
     **{
         f"nan in {name}": (arrays(**{name: entry(5, np.nan)}), rf"{name} holds a number that is not finite")
         for name in (
             *("object_position", "base_orientation", "joint_angles", "contact_force", "contact_point_link"),
+            "contact_moment",
             *("joint_velocities", "joint_torques", "joint_commands", *DISTURBED),
         )
     },

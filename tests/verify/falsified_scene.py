@@ -12,6 +12,7 @@ from tests.verify.falsify import (
     edited,
     hung,
     removed,
+    task,
 )
 
 IN_THE_SCENE: Cases = {
@@ -46,7 +47,18 @@ IN_THE_SCENE: Cases = {
         attribute(SCENE, THING + "/geom", "friction", "5 0.00108 0"),
         r"the friction of the object is 5",
     ),
-    "a sticky fingertip": (attribute(SCENE, BODY + "/geom", "friction", "0.9 1 0"), r"resists turning or rolling"),
+    "a sticky fingertip": (
+        attribute(SCENE, BODY + "/geom", "friction", "0.9 1 0"),
+        r"finger 'one' \(link 1\) does not resist turning",
+    ),
+    "fingertips that twist freely": (
+        edited(SCENE, BODY + "/geom", lambda e, p: e.set("friction", "0.9 0 0"), every=True),
+        r"finger 'one' \(link 1\) does not resist turning",
+    ),
+    "an object that resists a twist twice as well": (
+        attribute(SCENE, THING + "/geom", "friction", "0.9 0.00216 0"),
+        r"the object does not resist turning",
+    ),
     "the object's mass": (
         attribute(SCENE, THING + "/inertial", "mass", "0.01"),
         r"mass of the object is 0\.01 kg, in object\.urdf 0\.1",
@@ -88,6 +100,22 @@ IN_THE_SCENE: Cases = {
     "stiff motors": (
         edited(SCENE, ".//position", lambda e, p: e.set("kp", "1000"), every=True),
         r"joint_commands: .* motors of scene\.xml need",
+    ),
+    "motors twice as stiff as the task's": (
+        edited(SCENE, ".//position", lambda e, p: e.set("kp", "2"), every=True),
+        r"the motor of joint finger0_joint0 has 2 N·m/rad, the task's 1",
+    ),
+    "a motor softer than the task's": (
+        attribute(SCENE, ".//position[@joint='finger1_joint0']", "kp", "0.9"),
+        r"the motor of joint finger1_joint0 has 0\.9 N·m/rad, the task's 1",
+    ),
+    "the task names stiffer motors": (
+        task("stiffness: 1.0}", "stiffness: 50.0}"),
+        r"the motor of joint finger0_joint0 has 1 N·m/rad, the task's 50",
+    ),
+    "the task names other damping": (
+        task("stiffness: 1.0}", "stiffness: 1.0, damping: 0.5}"),
+        r"the motor of joint finger0_joint0 has a damping of 0\.\d+ N·m·s/rad, the task's 0\.5",
     ),
     "a motor less": (removed(SCENE, ".//position[@joint='finger2_joint1']"), r"its actuators turn"),
     "a motor on the object": (added(SCENE, "actuator", "<motor joint='object'/>"), r"<motor> in <actuator>"),

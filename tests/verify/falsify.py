@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import zipfile
 from collections.abc import Callable
 from contextlib import suppress
@@ -216,6 +217,19 @@ def hung(folder: Path) -> None:
     world.remove(thing)
     palm.append(thing)
     (folder / SCENE).write_text(ElementTree.tostring(root, encoding="unicode"))
+
+
+def links_of(folder: Path, shortest: float, longest: float) -> None:
+    """Let the task allow links of other lengths, m."""
+    lengths = re.search(r"link_length: \[.*\]", (folder / "task.yaml").read_text())
+    assert lengths is not None
+    task(lengths[0], f"link_length: [{shortest}, {longest}]")(folder)
+
+
+def tipped(folder: Path, torsion: float) -> None:
+    """Give the task fingertips of another torsional friction, m, and the scene likewise."""
+    task("fingertip: {torsion: 0.00108}", f"fingertip: {{torsion: {torsion}}}")(folder)
+    edited(SCENE, ".//body//geom", lambda e, p: e.set("friction", f"0.9 {torsion} 0"), every=True)(folder)
 
 
 def plain_forces(folder: Path, share: float = 0.0) -> None:

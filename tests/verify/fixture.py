@@ -229,6 +229,8 @@ def _skew(v: np.ndarray) -> np.ndarray:
 
 GRASP = np.vstack([np.hstack([np.eye(3)] * 3), np.hstack([_skew(point) for point in CONTACTS])])
 """(6, 9) contact forces to force and torque on the object, its frame."""
+NORMALS = np.array([[point[0], point[1], 0.0] for point in CONTACTS]) / RADIUS
+"""(3, 3) outward, of the object's surface at the contacts."""
 
 _TASK = """
 name: carried
@@ -241,28 +243,32 @@ friction: 0.9
 hand: {{joint_limits: [-150, 150], link_radius: 0.006}}
 actuator: {{torque: 0.5, speed: 5}}
 limits: {{unsupplied_force: 10}}
+{fingertip}
 """
 
 
-def carried(directory: Path, more: str = "", shape: str = "capsule") -> Scene:
+def carried(directory: Path, more: str = "", shape: str = "capsule", hard: bool = False) -> Scene:
     """Three fingers of two joints, held stiff, and an object between them; the palm carries all along a free curve.
 
-    Forces are chosen first and SciPy integrates the object under them; the palm then follows it rigidly. So physics
-    holds to the integrator's 1e-12, nothing slips, and the contact points stay where they are. It starts and ends at
-    rest. Where the task has perturbations, the least forces beside the plan's bear them.
+    Forces and torsional moments are chosen first and SciPy integrates the object under them; the palm then follows it
+    rigidly. So physics holds to the integrator's 1e-12, nothing slips or spins, and the contact points stay where they
+    are. It starts and ends at rest. Where the task has perturbations, the least forces beside the plan's bear them.
 
     Args:
         directory: for the task's file.
         more: sections of the task beside those of `_TASK`.
         shape: of the object, ``capsule`` or ``cylinder``; contacts are on the side that both have.
+        hard: whether fingertips are points, without moments.
     """
+    fingertip = "fingertip: {torsion: 0}" if hard else ""
     time, ends = np.linspace(0.0, 2.0, 21), [[0, 0, 0.28]] * 2
     places = [c.tolist() for c in CONTACTS]
-    draft = _TASK.format(*places, shape=shape, goals=_goals([0, 2], ends, [[1, 0, 0, 0]] * 2))
-    task = read_task(directory, draft)
-    forces, position, quaternion = _carrying(task)
+    goals = _goals([0, 2], ends, [[1, 0, 0, 0]] * 2)
+    task = read_task(directory, _TASK.format(*places, shape=shape, goals=goals, fingertip=fingertip))
+    moments = np.zeros((len(time), 3, 3)) if hard else _moments(time)
+    forces, position, quaternion = _carrying(task, moments)
     goals = _goals([0, 1, 2], position[[0, 10, 20]], quaternion[[0, 10, 20]])
-    task = read_task(directory, _TASK.format(*places, shape=shape, goals=goals) + more)
+    task = read_task(directory, _TASK.format(*places, shape=shape, goals=goals, fingertip=fingertip) + more)
     hand, angles, points = _grasp(task)
     turn = Rotation.from_quat(quaternion, scalar_first=True)
     base = Rotation.from_matrix(task.palm.rotation)
@@ -283,6 +289,7 @@ def carried(directory: Path, more: str = "", shape: str = "capsule") -> Scene:
         contact_point_link=np.tile(points, (samples, 1, 1)),
         external_force=np.zeros((samples, 3)),
         external_torque=np.zeros((samples, 3)),
+        contact_moment=None if hard else np.array([turn[k].apply(moments[k]) for k in range(samples)]),
     )
     return Scene(task, hand, _disturbed(task, motion, turn) if task.perturbations else motion)
 
@@ -315,20 +322,28 @@ def _goals(times: Any, positions: Any, quaternions: Any) -> str:
     return "\n".join(lines)
 
 
-def _carrying(task: Task) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _moments(time: np.ndarray) -> np.ndarray:
+    """Return torsional moments (S, 3, 3) on the object, N·m, in its frame: a part of what the fingertips bear."""
+    sizes = [0.5 * np.cos(np.pi * time), -0.3 + 0.0 * time, np.sin(np.pi * time)]
+    moments: np.ndarray = 3e-4 * np.column_stack(sizes)[:, :, None] * NORMALS
+    return moments
+
+
+def _carrying(task: Task, moments: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return contact forces (S, 3, 3) in the object's frame, and positions and orientations that follow from them.
 
     A squeeze, what a planned motion needs roughly, and a little more in the middle, by which it ends at rest.
     """
-    known = task.object.model_dump_json(), task.gravity
+    known = task.object.model_dump_json(), task.gravity, moments.tobytes()
     if known not in _carryings:
         time, inertia = np.linspace(0.0, 2.0, 21), np.asarray(task.object.inertia)
-        rough = _rough_forces(time, task.object.mass, inertia)
+        torques = moments.sum(axis=1)
+        rough = _rough_forces(time, task.object.mass, inertia, torques)
         body = CONTACTS, task.object.mass, inertia, np.asarray(task.gravity), np.array([0, 0, 0.28])
 
         def carry(wrench: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             more = np.outer(np.sin(np.pi * time / time[-1]), np.linalg.pinv(GRASP) @ wrench).reshape(-1, 3, 3)
-            return rough + more, _integrated(time, rough + more, *body)
+            return rough + more, _integrated(time, rough + more, *body, torques=torques)
 
         def speeds(wrench: np.ndarray) -> np.ndarray:
             last = carry(wrench)[1][-1]
@@ -348,18 +363,25 @@ def _carrying(task: Task) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 _carryings: dict[Any, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
 
 
-def _rough_forces(time: np.ndarray, mass: float, inertia: np.ndarray) -> np.ndarray:
-    """Return (S, 3, 3) contact forces in the object's frame: a squeeze, and what a planned motion needs roughly."""
+def _rough_forces(time: np.ndarray, mass: float, inertia: np.ndarray, torques: np.ndarray) -> np.ndarray:
+    """Return (S, 3, 3) contact forces in the object's frame: a squeeze, and what a planned motion needs roughly.
+
+    Args:
+        time: s.
+        mass: of the object, kg.
+        inertia: kg·m², its frame.
+        torques: (S, 3) N·m that act beside them.
+    """
     axis = np.array([1.0, 2.0, 0.5]) / np.linalg.norm([1.0, 2.0, 0.5])
     inward = (-1.5 * np.array([[p[0], p[1], 0.0] for p in CONTACTS]) / RADIUS).ravel()
     squeeze = inward - np.linalg.lstsq(GRASP, GRASP @ inward, rcond=None)[0]
     forces = []
-    for t in time:
+    for t, torque in zip(time, torques, strict=True):
         angle, spin_up = 0.25 * (1 - np.cos(np.pi * t)), 0.25 * np.pi**2 * np.cos(np.pi * t)
         acceleration = 0.02 * np.pi**2 * np.cos(np.pi * t) * np.array([1.0, 0.5, 0.3])
         turn = Rotation.from_rotvec(angle * axis)
         force = turn.apply(mass * (acceleration + np.array([0, 0, 9.81])), inverse=True)
-        wrench = np.concatenate([force, inertia @ axis * spin_up])
+        wrench = np.concatenate([force, inertia @ axis * spin_up - torque])
         forces.append(np.linalg.lstsq(GRASP, wrench, rcond=None)[0] + squeeze)
     return np.array(forces).reshape(-1, 3, 3)
 
@@ -373,13 +395,14 @@ def integrate(
     gravity: np.ndarray,
     start: np.ndarray,
     rate: Any = (0.0, 0.0, 0.0),
+    torques: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Integrate a body with SciPy under forces (S, C, 3) at fixed points (C, 3), both in its own frame.
+    """Integrate a body with SciPy under forces (S, C, 3) at fixed points (C, 3) and torques (S, 3), all in its frame.
 
     Returns:
         positions (S, 3) and orientations (S, 4) [w, x, y, z] ; it starts upright, at rest but for ``rate``.
     """
-    states = _integrated(time, forces, points, mass, inertia, gravity, start, rate)
+    states = _integrated(time, forces, points, mass, inertia, gravity, start, rate, torques)
     return states[:, :3], _quaternions(states)
 
 
@@ -397,8 +420,10 @@ def _integrated(
     gravity: np.ndarray,
     start: np.ndarray,
     rate: Any = (0.0, 0.0, 0.0),
+    torques: np.ndarray | None = None,
 ) -> np.ndarray:
     """Return states (S, 18): position, velocity, rotation matrix, rate in the body's frame."""
+    beside = np.zeros((len(time), 3)) if torques is None else torques
     states = [np.concatenate([start, np.zeros(3), np.eye(3).ravel(), rate])]
     for k in range(len(time) - 1):
 
@@ -407,6 +432,7 @@ def _integrated(
             force = (1 - share) * forces[k] + share * forces[k + 1]
             turn, omega = y[6:15].reshape(3, 3), y[15:]
             torque = sum(_skew(p) @ f for p, f in zip(points, force, strict=True))
+            torque += (1 - share) * beside[k] + share * beside[k + 1]
             acceleration = turn @ force.sum(axis=0) / mass + gravity
             spin = np.linalg.solve(inertia, torque - np.cross(omega, inertia @ omega))
             return np.concatenate([y[3:6], acceleration, (turn @ _skew(omega)).ravel(), spin])

@@ -21,7 +21,7 @@ from casadi_hands.verify.reading.folder import read_folder
 from casadi_hands.verify.trajectory import build_trajectory
 from tests.verify.falsified_files import DISAGREEMENTS
 from tests.verify.falsified_hand import HAND_AGAINST_TASK, HIDDEN
-from tests.verify.falsified_motion import DISTURBANCES, NO_NUMBERS
+from tests.verify.falsified_motion import DISTURBANCES, NO_NUMBERS, TORSION
 from tests.verify.falsified_scene import IN_THE_SCENE
 from tests.verify.falsify import (
     DISTURBED,
@@ -81,6 +81,7 @@ CASES = {
     f"{kind}: {name}": case
     for kind, cases in {
         "disturbances": DISTURBANCES,
+        "torsion": TORSION,
         "hand against task": HAND_AGAINST_TASK,
         "hidden": HIDDEN,
         "no numbers": NO_NUMBERS,
@@ -129,6 +130,7 @@ def test_an_object_that_no_hand_touches_is_not_certified(
         base_orientation=np.tile(scene.motion.base_orientation[0], (len(time), 1)),
         contact_active=np.zeros_like(scene.motion.contact_active),
         contact_force=np.zeros_like(scene.motion.contact_force),
+        contact_moment=np.zeros_like(scene.motion.contact_force),
         **dict.fromkeys(DISTURBED),
     )
     found = audit_files(replace(scene, task=task, motion=motion).write(tmp_path))
@@ -150,7 +152,7 @@ def test_an_object_that_no_hand_touches_is_not_certified(
         arrays(more=np.arange(3)),
         lambda folder: (folder / "motion.csv").unlink(),
         lambda folder: (folder / "notes.txt").write_text("of the reader"),
-        task("actuator: {torque: 0.5, speed: 5.0}\n", ""),
+        task("actuator: {torque: 0.5, speed: 5.0, stiffness: 1.0}\n", ""),
     ],
 )
 def test_what_says_the_same_stays_certified(bad: Path, vary: Falsify) -> None:

@@ -182,6 +182,10 @@ def _servo_problems(folder: Folder, scene: Scene) -> list[str]:
         if not same(servo.stiffness, folder.task.actuator.stiffness):
             due = folder.task.actuator.stiffness
             problems.append(f"the motor of joint {servo.joint} has {servo.stiffness:.4g} N·m/rad, the task's {due:.4g}")
+        damping = folder.task.actuator.damping
+        if damping is not None and not same(servo.damping, damping):
+            stated = f"has a damping of {servo.damping:.4g} N·m·s/rad, the task's {damping:.4g}"
+            problems.append(f"the motor of joint {servo.joint} {stated}")
         if servo.damping < 0.0:
             problems.append(f"the actuator of joint {servo.joint} drives itself: its kv is {servo.damping:.4g}")
     return problems

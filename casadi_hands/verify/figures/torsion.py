@@ -25,16 +25,17 @@ def torsion_figures(folder: Folder, placed: Placements, path: Trajectory) -> lis
     """Return how far moments exceed their limits, how far they fall short of them where contacts spin, and their use.
 
     All moments are over ρ, so that they are forces, and these over the weight; the last two are shares of the limit.
+    Where the file states none there are none. No figures of hard points without moments.
     """
-    motion, limits = folder.motion, folder.task.limits
-    if motion.contact_moment is None:
+    motion, limits, radius = folder.motion, folder.task.limits, folder.task.fingertip.torsion
+    if motion.contact_moment is None and not radius:
         return []
-    radius = folder.task.fingertip.torsion
+    moments = np.zeros_like(motion.contact_force) if motion.contact_moment is None else motion.contact_moment
     excess, use = (0.0, "no contact bears a moment beyond its limit"), (0.0, "no contact that rests bears a moment")
     most, about = np.zeros(motion.contact_active.shape), np.zeros(motion.contact_active.shape)
     for k, c in active_contacts(folder):
         normal = surface_normals(folder, placed, k, c)[0]
-        force, moment = motion.contact_force[k, c], motion.contact_moment[k, c]
+        force, moment = motion.contact_force[k, c], moments[k, c]
         soft = radius if motion.contact_link[c] != "ground" else 0.0
         pressing = max(-float(force @ normal), 0.0)
         across = float(np.linalg.norm(force - (force @ normal) * normal)) / folder.friction(c)
@@ -43,7 +44,7 @@ def torsion_figures(folder: Folder, placed: Placements, path: Trajectory) -> lis
         over = abs(about[k, c]) - most[k, c] + unborne / (soft or 1e-3 * folder.length)
         at = f"contact '{motion.contact_names[c]}' at {motion.time[k]:.3g} s"
         excess = worse(excess, (over / folder.weight, f"a moment exceeds what the tip bears by {{value}}, at {at}"))
-    stray = np.abs(motion.contact_moment[~motion.contact_active]).max(initial=0.0)
+    stray = np.abs(moments[~motion.contact_active]).max(initial=0.0)
     excess = worse(
         excess, (float(stray) / (folder.weight * folder.length), "a contact that is not active has a moment")
     )
