@@ -39,7 +39,8 @@ def torsion_figures(folder: Folder, placed: Placements, path: Trajectory) -> lis
         soft = radius if motion.contact_link[c] != "ground" else 0.0
         pressing = max(-float(force @ normal), 0.0)
         across = float(np.linalg.norm(force - (force @ normal) * normal)) / folder.friction(c)
-        most[k, c], about[k, c] = np.sqrt(max(pressing**2 - across**2, 0.0)), float(moment @ normal) / (soft or np.inf)
+        most[k, c] = np.sqrt(max(pressing**2 - across**2, 0.0)) if soft else 0.0
+        about[k, c] = float(moment @ normal) / (soft or np.inf)
         unborne = float(np.linalg.norm(moment - (moment @ normal) * normal)) if soft else float(np.linalg.norm(moment))
         over = abs(about[k, c]) - most[k, c] + unborne / (soft or 1e-3 * folder.length)
         at = f"contact '{motion.contact_names[c]}' at {motion.time[k]:.3g} s"
