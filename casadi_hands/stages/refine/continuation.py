@@ -140,7 +140,7 @@ class Continuation:
     def _pressing(self, exact: Refined, margin: Margin) -> WholeHand:
         """A motion with its fingers' forces as much larger as another margin asks for: a start that presses enough."""
         force, contacts = exact.hand.force.copy(), list(self.contacts)
-        pressing = np.linalg.norm(force[:, contacts], axis=2)[self.active[:, contacts]]
+        pressing = np.linalg.norm(force[:, contacts], axis=2)[exact.hand.active[:, contacts]]
         firmer = margin.normal_force / max(float(np.quantile(pressing, 0.1)), exact.margin.normal_force)
         force[:, contacts] *= max(1.0, firmer, exact.margin.friction / margin.friction)
         return replace(exact.hand, force=force)

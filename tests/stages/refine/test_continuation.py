@@ -339,16 +339,27 @@ def test_a_motion_that_is_exact_but_for_its_samples_takes_the_last_step_alone(
     assert told.ways == len(answers) * [("fine", "hard constraints")]
 
 
-@pytest.mark.parametrize(("grip", "factor"), [(2.0, 4.0), (0.25, 1.0)])
+@pytest.mark.parametrize(
+    ("presses", "grip", "friction", "factor"),
+    [
+        (0.4, 2.0, 0.5, 4.0),  # by the margins, where nearly nothing presses with more than it must
+        (1.6, 2.0, 0.5, 1.25),  # by what presses least, but for a tenth
+        (3.0, 2.0, 0.5, 1.0),
+        (0.4, 0.25, 0.5, 1.0),
+        (3.0, 2.0, 0.25, 2.0),  # half the friction may be used: as along the surface, twice into it
+    ],
+)
 def test_a_grip_is_made_firmer_on_few_knots_first_from_a_motion_that_presses_as_much(
-    start: WholeHand, grip: float, factor: float
+    start: WholeHand, presses: float, grip: float, friction: float, factor: float
 ) -> None:
-    kept, other = Margin(normal_force=0.5), Margin(normal_force=grip)
+    kept, other = Margin(normal_force=0.5), Margin(friction, grip)
+    sizes = np.linalg.norm(start.force[:, [0, 2]], axis=2)[start.active[:, [0, 2]]]
+    start = replace(start, force=start.force * presses / np.quantile(sizes, 0.1))
     exact = Refined(start, True, Worst("a", 0.0, None), {}, False, False, (), {}, kept)
     told = Told(lambda level, homotopy, margin: margin == other)
     assert told.with_margin(exact, other).exact
     assert told.ways == [("sparse", SHORT), ("coarse", "hard constraints"), ("fine", "hard constraints")]
     found, fingers = told.wanted[-1].force, [0, 2]
-    np.testing.assert_array_equal(found[:, fingers], factor * start.force[:, fingers])
+    np.testing.assert_allclose(found[:, fingers], factor * start.force[:, fingers], rtol=1e-12)
     # What the ground and other contacts bear follows from that.
     np.testing.assert_array_equal(np.delete(found, fingers, axis=1), np.delete(start.force, fingers, axis=1))
