@@ -23,7 +23,15 @@ from casadi_hands.stages.refine import continuation
 from casadi_hands.stages.refine import stage as refine
 from casadi_hands.stages.refine.continuation import Continuation
 from casadi_hands.stages.refine.result import Refined, Worst
-from casadi_hands.stages.refine.settings import ACCEPTED, ALL_STEPS, HARD_CONSTRAINTS, HOPELESS, RESTORATION, WEIGHTS
+from casadi_hands.stages.refine.settings import (
+    ACCEPTED,
+    ALL_STEPS,
+    HARD_CONSTRAINTS,
+    HOPELESS,
+    RESTORATION,
+    SOFT,
+    WEIGHTS,
+)
 from casadi_hands.stages.refine.stage import RefineStage
 from casadi_hands.stages.refine.values import TOOL_TOLERANCE, Margin, RefineValues, longest_run
 from casadi_hands.task import Task, load_task
@@ -395,7 +403,7 @@ def test_one_joint_cannot_roll_with_the_object_and_no_exact_solve_is_tried(solve
     assert names[0] == "sparse penalty"
     assert not any("hard constraints" in name for name in names)
     assert len(refined.hand.position) == len(model.schedule.samples)
-    assert refined.weights == {f"sparse {what}": weights for what, weights, _ in ALL_STEPS}[names[-1]]
+    assert refined.weights == {f"sparse {what}": weights | SOFT for what, weights, _ in ALL_STEPS}[names[-1]]
 
 
 def test_an_exact_motion_stays_itself_by_the_short_way(solved: Solved) -> None:
