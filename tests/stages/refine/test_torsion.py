@@ -74,7 +74,7 @@ def test_the_torque_is_that_of_moments_about_the_outward_normals() -> None:
     ((name, residual),) = kernel.constraints.items()
     # The cost of the torsion has the same name.
     function = ca.Function(name, [kernel.variables, kernel.parameters], [residual, kernel.terms[contact.TORSION.name]])
-    made, cost = (np.ravel(value) for value in function(*packed(kernel, variables, parameters)))
+    made, cost = (np.asarray(value).ravel() for value in function(*packed(kernel, variables, parameters)))
     assert made == pytest.approx(due - total, abs=2e-6)  # normals are rounded where distances vanish
     assert cost == pytest.approx(torsions @ torsions)
     check_block(kernel, variables, parameters)
