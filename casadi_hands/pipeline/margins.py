@@ -20,6 +20,7 @@ SENSOR = np.deg2rad(0.75)  # error of a joint's sensor that must not take a fing
 WEAKEST, FIRMEST = 0.3, 6.0  # weights, of ample lower bounds on the normal force
 FIRMER = 2.0  # times that
 SURER = 0.4  # share of the friction that may be used, where errors are to take less of it
+SPARING = 0.65  # share of it, where the grip is to ask for less stiffness
 SMALL = Margin(friction=0.8, normal_force=0.25)
 
 
@@ -30,10 +31,12 @@ class Margins:
     Attributes:
         ample: to begin with.
         larger: for where replays drop the object.
+        softer: for where they do because joints that are hardly stiff enough let it whirl away.
     """
 
     ample: Margin
     larger: Margin
+    softer: Margin
 
 
 def margins_for(model: Model, whole: WholeHand) -> Margins:
@@ -44,4 +47,5 @@ def margins_for(model: Model, whole: WholeHand) -> Margins:
         if touching.any():
             changes.append(float(np.median(forces_of_joint_errors(model, whole, i, SENSOR)[touching])))
     ample = Margin(normal_force=round(float(np.clip(max(changes), WEAKEST, FIRMEST)), 2))
-    return Margins(ample, replace(ample, friction=SURER, normal_force=FIRMER * ample.normal_force))
+    larger = replace(ample, friction=SURER, normal_force=FIRMER * ample.normal_force)
+    return Margins(ample, larger, Margin(friction=SPARING, normal_force=min(ample.normal_force, WEAKEST)))

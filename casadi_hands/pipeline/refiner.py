@@ -31,6 +31,7 @@ BETWEEN = {"residual", "residual_between", "gap_between", "slip", "penetration",
 FINEST = 0.02  # s between samples
 ENOUGH = 0.7  # of a limit: intervals that contribute more are halved
 LEFT = 1 / 8  # of what an interval slips, once it is halved; a cubic spline's error falls to a sixteenth
+HARDLY = 0.3  # of the joints' stiffness: a grasp that asks for more is lost where joints are a little softer
 AIM = 3.0  # deg from any goal in the replay as planned, beyond which another margin is tried
 GAIN = 0.8  # of how far limits are missed, that more samples must reach to be worth still more
 
@@ -86,12 +87,16 @@ class Refiner:
             if design.status == "certified":
                 judged, refined, stage = design, other, halved
         judged = self._replayed(judged)
-        if refined.margin != largest and (judged.drops or judged.replay_angle > AIM):
-            text = f"again with a larger lower bound on normal forces: {judged.replay_words}"
-            firm = self._with_margin(whole, refined, stage, largest, text)
-            design = self._replayed(self._judged(stage.model, firm, short, planned))
+        another, which = largest, "firmer"
+        if judged.least_stiffness > HARDLY * self.record.task.actuator.stiffness:
+            another, which = margins.softer, "softer"
+        if refined.margin != another and (judged.drops or judged.replay_angle > AIM):
+            other = self._with_margin(
+                whole, refined, stage, another, f"again with a {which} grip: {judged.replay_words}"
+            )
+            design = self._replayed(self._judged(stage.model, other, short, planned))
             if rank_of(design) < rank_of(judged):
-                return design, firm
+                return design, other
         return judged, refined
 
     def _between(

@@ -58,8 +58,13 @@ class Result:
         return int(first["of"] if first["dropped_as_planned"] else first["dropped"])
 
     @property
+    def least_stiffness(self) -> float:
+        """Stiffness of the joints, N·m/rad, that the planned grasp asks for; 0 where that was not measured."""
+        return float(self.certificate.get("least_stiffness", {}).get("value") or 0.0)
+
+    @property
     def replay_angle(self) -> float:
-        """Degrees by which the object is turned from a goal at most in the replay as planned; 0 where there was none."""
+        """Degrees by which the object is off a goal at most in the replay as planned; 0 where there was none."""
         return float(self.certificate.get("replay_angle", {}).get("value") or 0.0)
 
     @property

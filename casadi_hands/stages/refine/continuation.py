@@ -138,11 +138,11 @@ class Continuation:
         return self.fine.passes_through(refined)
 
     def _pressing(self, exact: Refined, margin: Margin) -> WholeHand:
-        """A motion with its fingers' forces as much larger as another margin asks for: a start that presses enough."""
+        """A motion with its fingers' forces as another margin asks for: a start that presses enough, and no more."""
         force, contacts = exact.hand.force.copy(), list(self.contacts)
         pressing = np.linalg.norm(force[:, contacts], axis=2)[exact.hand.active[:, contacts]]
         firmer = margin.normal_force / max(float(np.quantile(pressing, 0.1)), exact.margin.normal_force)
-        force[:, contacts] *= max(1.0, firmer, exact.margin.friction / margin.friction)
+        force[:, contacts] *= max(firmer, exact.margin.friction / margin.friction)
         return replace(exact.hand, force=force)
 
     def _on_few(self, steps: tuple[Step, ...], start: WholeHand, margin: Margin) -> Refined:
