@@ -23,7 +23,7 @@ from scipy.spatial.transform import Rotation
 from casadi_hands.verify.figures.closest import closest_to_capsule, level_directions, lowest_points
 from casadi_hands.verify.reading.folder import Folder
 
-STEP = 1e-4
+STEP = 2e-3
 """rad, and of the object's half extent: by which the grasp is moved to see what its forces do."""
 TWIST = np.deg2rad(5.0)
 """Angle of a contact's spin at which torsional friction has given all it has: it counts as a spring until then."""
