@@ -17,7 +17,8 @@ from casadi_hands.problem.placement import forces_of_joint_errors
 from casadi_hands.stages.refine.values import Margin
 
 SENSOR = np.deg2rad(0.75)  # error of a joint's sensor that must not take a finger off the object
-WEAKEST, FIRMEST = 0.3, 6.0  # weights, of ample lower bounds on the normal force
+WEAKEST, AMPLE = 0.3, 1.5  # weights, of lower bounds on the normal force to begin with
+FIRMEST = 6.0  # weights, where replays drop the object
 FIRMER = 2.0  # times that
 SURER = 0.4  # share of the friction that may be used, where errors are to take less of it
 SPARING = 0.65  # share of it, where the grip is to ask for less stiffness
@@ -46,6 +47,7 @@ def margins_for(model: Model, whole: WholeHand) -> Margins:
         touching = whole.active[:, contact]
         if touching.any():
             changes.append(float(np.median(forces_of_joint_errors(model, whole, i, SENSOR)[touching])))
-    ample = Margin(normal_force=round(float(np.clip(max(changes), WEAKEST, FIRMEST)), 2))
-    larger = replace(ample, friction=SURER, normal_force=FIRMER * ample.normal_force)
+    asked = round(min(max(*changes, WEAKEST), FIRMEST), 2)
+    ample = Margin(normal_force=min(asked, AMPLE))
+    larger = replace(ample, friction=SURER, normal_force=max(asked, FIRMER * ample.normal_force))
     return Margins(ample, larger, Margin(friction=SPARING, normal_force=min(ample.normal_force, WEAKEST)))
