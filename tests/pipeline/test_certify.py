@@ -27,7 +27,7 @@ from tests.pipeline.replayed import replayed
 from tests.stages.example import made_up_solution
 from tests.stages.synthesis.example import ball_target, ball_task, hand, pointing
 
-AMPLE, LARGE = Margin(), Margin(normal_force=4.0)
+AMPLE, LARGE, SOFT = Margin(), Margin(normal_force=4.0), Margin(0.65, 0.3)
 Verdict = tuple[
     int, tuple[int, ...], bool
 ]  # limits missed, contacts that cannot meet them, whether it slips hopelessly
@@ -228,7 +228,7 @@ def test_what_is_missed_only_between_samples_gets_more_of_them(
         kept = {name: Figure(name, 0.0, 1.0, "m", "") for name in refiner_module.BETWEEN}
         return SimpleNamespace(figures={**kept, missed: Figure(missed, parts.sum(), 1.0, "m", "", by_interval=parts)})
 
-    monkeypatch.setattr(refiner_module, "margins_for", lambda *_: Margins(AMPLE, LARGE))
+    monkeypatch.setattr(refiner_module, "margins_for", lambda *_: Margins(AMPLE, LARGE, SOFT))
     monkeypatch.setattr(refiner_module, "Continuation", Once)
     monkeypatch.setattr(Refiner, "_with_margin", lambda *_: SimpleNamespace(exact=False))  # no grip is any better
     monkeypatch.setattr(refiner_module, "resampled", lambda hand, before, after: hand)
@@ -274,17 +274,34 @@ class Ways:
 
 
 def refine(
-    monkeypatch: pytest.MonkeyPatch, ways: Ways, homotopy: float, statuses: list[str], drops: list[int]
+    monkeypatch: pytest.MonkeyPatch,
+    ways: Ways,
+    homotopy: float,
+    statuses: list[str],
+    drops: list[int],
+    stiffness: float = 0.1,
+    angle: float = 1.0,
 ) -> tuple[Margin, int]:
-    """The margin of what is kept and its drops, where designs and drops are judged as told, in this order."""
+    """The margin of what is kept and its drops, where designs and drops are judged as told, in this order.
+
+    Of each the grasp asks for a stiffness, N·m/rad, and the replay as planned ends at an angle, degrees, off a goal.
+    """
     judged, dropped = iter(statuses), iter(drops)
-    monkeypatch.setattr(refiner_module, "margins_for", lambda *_: Margins(AMPLE, LARGE))
+    monkeypatch.setattr(refiner_module, "margins_for", lambda *_: Margins(AMPLE, LARGE, SOFT))
     monkeypatch.setattr(refiner_module, "Continuation", lambda *_: ways)
     monkeypatch.setattr(Refiner, "_attempt", lambda self, whole, margin, refine: refine(margin=margin))
-    monkeypatch.setattr(Refiner, "_judged", lambda self, *_: replace(self.record.design, status=next(judged)))
+    measured = {"least_stiffness": {"value": stiffness, "limit": 1.0, "holds": True}}
+    told = {"replay_angle": {"value": angle, "limit": 5.0, "holds": True}}
+
+    def judge(self: Refiner, *_: Any) -> Design:
+        return replace(self.record.design, status=next(judged), certificate=measured)
 
     def played(self: Refiner, design: Design) -> Design:
-        return replayed(design, next(dropped)) if design.status == "certified" else design
+        if design.status != "certified":
+            return design
+        return replayed(replace(design, certificate=measured | told), next(dropped))
+
+    monkeypatch.setattr(Refiner, "_judged", judge)
 
     monkeypatch.setattr(Refiner, "_replayed", played)
     whole: Any = SimpleNamespace(contacts=(0, 1), fingers=(), active=None)
@@ -306,6 +323,22 @@ def test_a_firmer_grip_is_tried_where_replays_drop_and_kept_where_they_drop_less
     assert refine(monkeypatch, ways, homotopy, ["certified"] * len(drops), drops) == (kept, min(drops))
     first = ("solve" if homotopy == 1 else "continue_from", AMPLE)
     assert ways.asked == [first, *[("with_margin", LARGE)] * (len(drops) - 1)]
+
+
+@pytest.mark.parametrize(("drops", "kept"), [([4, 2], SOFT), ([4, 4], AMPLE), ([0], AMPLE)])
+def test_a_softer_grip_is_tried_instead_where_joints_are_hardly_stiff_enough(
+    monkeypatch: pytest.MonkeyPatch, drops: list[int], kept: Margin
+) -> None:
+    ways = Ways(firm=False)
+    statuses = ["certified"] * len(drops)
+    assert refine(monkeypatch, ways, 1.0, statuses, drops, stiffness=0.4) == (kept, min(drops))
+    assert ways.asked == [("solve", AMPLE), *[("with_margin", SOFT)] * (len(drops) - 1)]
+
+
+def test_another_grip_is_tried_where_the_replay_as_planned_ends_off_its_goals(monkeypatch: pytest.MonkeyPatch) -> None:
+    ways = Ways(firm=False)
+    refine(monkeypatch, ways, 1.0, ["certified"] * 2, [0, 0], angle=4.0)
+    assert ways.asked == [("solve", AMPLE), ("with_margin", LARGE)]
 
 
 def test_a_long_way_is_gone_with_a_firm_grip_at_once_where_it_can_be(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -344,12 +344,13 @@ def test_a_motion_that_is_exact_but_for_its_samples_takes_the_last_step_alone(
     [
         (0.4, 2.0, 0.5, 4.0),  # by the margins, where nearly nothing presses with more than it must
         (1.6, 2.0, 0.5, 1.25),  # by what presses least, but for a tenth
-        (3.0, 2.0, 0.5, 1.0),
+        (3.0, 2.0, 0.5, 1.0),  # no softer, for the friction
         (0.4, 0.25, 0.5, 1.0),
         (3.0, 2.0, 0.25, 2.0),  # half the friction may be used: as along the surface, twice into it
+        (3.0, 0.3, 1.0, 0.5),
     ],
 )
-def test_a_grip_is_made_firmer_on_few_knots_first_from_a_motion_that_presses_as_much(
+def test_another_grip_is_had_on_few_knots_first_from_a_motion_that_presses_as_much(
     start: WholeHand, presses: float, grip: float, friction: float, factor: float
 ) -> None:
     kept, other = Margin(normal_force=0.5), Margin(friction, grip)
