@@ -104,6 +104,7 @@ _ADVICE = {
     "pull": "contacts that oppose each other better",
     "torsion_excess": "softer fingertips (fingertip.torsion) or more fingers",
     "torsion_shortfall": "harder fingertips (fingertip.torsion) or more joints (search.max_joints)",
+    "slide_shortfall": "a smaller time_step, or more joints (search.max_joints)",
     "gap": "more joints (search.max_joints) or contacts nearer the palm",
     "gap_between": "a smaller time_step or more joints (search.max_joints)",
     "slip": "more joints (search.max_joints), or limits.slip as wide as you can accept",

@@ -39,7 +39,15 @@ class Limits(Section):
     penetration: NonNegative = Field(default=0.0001, description="Depth by which two bodies overlap, m.")
     gap: NonNegative = Field(default=0.00005, description="Distance of an active contact's surfaces at samples, m.")
     gap_between: NonNegative = Field(default=0.0001, description="The same between samples, m.")
-    slip: NonNegative = Field(default=0.0002, description="Slip of a contact from touch to lift, m.")
+    slip: NonNegative = Field(
+        default=0.0002,
+        description="Slip of a contact from touch to lift, m. From 0.001 on, and 2 % of the characteristic length, "
+        "contacts may be planned to slide by 80 % of it at most, with friction on its cone against the slip.",
+    )
+    slide_shortfall: NonNegative = Field(
+        default=0.15,
+        description="Share by which the tangential force of a contact that slides is off its cone against the slip.",
+    )
     unsupplied_force: NonNegative = Field(
         default=0.02, description="Contact force that the joints cannot supply actively, over weight."
     )

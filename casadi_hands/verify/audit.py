@@ -26,6 +26,7 @@ from casadi_hands.verify.figures.contact import (
 from casadi_hands.verify.figures.disturbances import disturbed_figures
 from casadi_hands.verify.figures.dynamics import Shots, between_residual, sample_residual, shoot
 from casadi_hands.verify.figures.goals import goal_figures, rest_figure
+from casadi_hands.verify.figures.sliding import sliding_figure
 from casadi_hands.verify.figures.stiffness import stability_figures
 from casadi_hands.verify.figures.torsion import torsion_figures
 from casadi_hands.verify.figures.wrench import disturbance_figure, torque_figure, unsupplied_figure
@@ -90,6 +91,7 @@ def audit_files(directory: str | Path, task: str | Path | None = None) -> Audit:
         *disturbed_figures(folder),
         *friction_figures(folder, placed),
         *torsion_figures(folder, placed, path),
+        sliding_figure(folder, placed, path),
         gap_at_samples(folder, placed),
         gap_between_samples(folder, path),
         slip_figure(folder, path),

@@ -27,7 +27,7 @@ UNIT_OF = {
     **dict.fromkeys(("residual", "residual_between", "friction_excess", "pull", "unsupplied_force"), "weight"),
     "torsion_excess": "weight",
     "least_stiffness": "N·m/rad",
-    **dict.fromkeys(("speed", "torque", "replay_dropped", "torsion_shortfall"), "share"),
+    **dict.fromkeys(("speed", "torque", "replay_dropped", "torsion_shortfall", "slide_shortfall"), "share"),
     "disturbance_radius": "weight",
 }
 """Units of the limits."""

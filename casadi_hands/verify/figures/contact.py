@@ -161,8 +161,15 @@ def _contact_point(folder: Folder, path: Trajectory, contact: int, i: int) -> tu
 
 def _slip_steps(folder: Folder, path: Trajectory, contact: int) -> np.ndarray:
     """Return the slip of one contact from each sample to the next, (S - 1,) m, whether active or not."""
-    link = folder.motion.contact_link[contact]
     slip = np.zeros(len(folder.motion.time) - 1)
+    for k, moved in slides(folder, path, contact):
+        slip[k] += float(np.linalg.norm(moved))
+    return slip
+
+
+def slides(folder: Folder, path: Trajectory, contact: int) -> Iterator[tuple[int, np.ndarray]]:
+    """Yield, of every dense step, its interval and how far (3,) m, world, the object slides over the other body."""
+    link = folder.motion.contact_link[contact]
     # Every other dense time is the middle of a step; taking the contact point there cancels second-order errors.
     for middle in range(1, len(path.time) - 1, 2):
         point, k = _contact_point(folder, path, contact, middle)
@@ -170,8 +177,7 @@ def _slip_steps(folder: Folder, path: Trajectory, contact: int) -> np.ndarray:
         world = rotation @ point + position
         moved = _carried(path, "object", world, middle) - _carried(path, link, world, middle)
         normal = rotation @ folder.object.normal(point)
-        slip[k] += float(np.linalg.norm(moved - (moved @ normal) * normal))
-    return slip
+        yield k, moved - (moved @ normal) * normal
 
 
 def _carried(path: Trajectory, body: str, world: np.ndarray, middle: int) -> np.ndarray:
