@@ -66,6 +66,7 @@ class Model:
         clearance: that bodies which do not touch keep from each other, lengths.
         stiffness: of a joint in m·g·length/rad.
         torsion: radius of the fingertips' torsional friction, lengths; 0 for hard points.
+        sliding: lengths that a finger's contact may be planned to slide from touch to lift; 0 where it must roll.
         regrasp: planned, or None where fingers stay where they touch.
         own_terms: costs and constraints that a person adds to those of the stages.
     """
@@ -98,6 +99,7 @@ class Model:
     clearance: float
     stiffness: float
     torsion: float
+    sliding: float = 0.0
     regrasp: Regrasp | None = None
     own_terms: tuple[OwnTerm, ...] = ()
 

@@ -72,6 +72,27 @@ def forces_of_joint_errors(model: Model, motion: WholeHand, finger: int, error: 
     return np.asarray(error * model.stiffness * np.abs(np.einsum("snj,sj->sn", inverse, normals)).sum(axis=1))
 
 
+def contact_slips(model: Model, motion: WholeHand, finger: int) -> Array:
+    """(S - 1, 3) by which a finger's contact goes farther over the object than over the last link, object frame.
+
+    Args:
+        model: the task.
+        motion: of the samples.
+        finger: index of the finger among the motion's.
+    """
+    origins, links = (
+        each[:, -1] for each in link_frames(motion.fingers[finger], model.link_radius, motion.angles[finger])
+    )
+    points = motion.point[:, motion.contacts[finger]]
+    on_link = np.einsum("sba,sb->sa", links, in_palm(model, motion, points) - origins)
+    palms = np.array([pin.Quaternion(*q).matrix() for q in motion.palm_quaternion])
+    turns = np.einsum("sba,sbc->sac", palms, [object_rotation(model, v) for v in motion.vector])
+    ways = [
+        np.einsum("sab,sb->sa", r[:-1] + r[1:], np.diff(p, axis=0)) / 2 for r, p in ((turns, points), (links, on_link))
+    ]
+    return np.asarray(np.einsum("sba,sb->sa", turns[:-1], ways[0] - ways[1]))
+
+
 def contact_spins(model: Model, motion: WholeHand, finger: int, normals: Array) -> Array:
     """(S - 1,) rad by which the object turns against a finger's last link from sample to sample.
 

@@ -35,6 +35,8 @@ Array = NDArray[np.float64]
 _WITHIN = 0.9 / math.sqrt(3)  # share of a limit that each of three coordinates may use
 # Lengths: beyond these a gap is no contact, and slip would need friction on its cone, whatever a task accepts.
 _MOST_GAP, _MOST_SLIP = 2e-4, 2e-3
+# Accepted slip from which on it may be planned, m and lengths, and the share of it that may be.
+_SLIDING, _FAR, _PLANNED = 1e-3, 0.02, 0.8
 
 
 def build_model(task: Task) -> Model:
@@ -83,10 +85,16 @@ def build_model(task: Task) -> Model:
         speed_limit=math.inf if actuator.speed is None else actuator.speed,
         stiffness=round_off(actuator.stiffness / units.torque),
         torsion=round_off(task.fingertip.torsion / length),
+        sliding=_sliding(task.limits.slip, length),
         force_limit=given or USUAL_FORCE,
         clearance=round_off(task.hand.clearance / length),
     )
     return model if given else replace(model, force_limit=usual_force_limit(model))
+
+
+def _sliding(slip: float, length: float) -> float:
+    """Lengths of slip that may be planned where this slip, m, is accepted."""
+    return round_off(_PLANNED * slip / length) if slip >= max(_SLIDING, _FAR * length) else 0.0
 
 
 def _contacts(task: Task, bodies: Sequence[Body], length: float) -> tuple[Contact, ...]:

@@ -27,6 +27,10 @@ _QUANTITIES = {
     "torsion": Quantity("moments of contacts about the object's outward normals, over their radius", "m·g"),
     "twist_torque": Quantity("the torque of all contacts' torsion; object frame", _TORQUE),
     "spin": Quantity("how fast the object turns on each fingertip, about its outward normal", "rad/s"),
+    "slip": Quantity(
+        "how fast the contact goes over the object faster than over its fingertip, across the surface", "length/s"
+    ),
+    "sticking": Quantity("tangential force beside that of sliding, over friction and what the slip leaves of it", ""),
     "base": Quantity("where the finger stands on the palm", "length"),
     "lengths": Quantity("of the links", "length"),
     "axes": Quantity("of the joints: two exponential coordinates each, from the frames' third columns", "rad"),
@@ -52,6 +56,9 @@ _QUANTITIES = {
     "friction": Quantity("coefficient of friction, or the part of it that may be used", ""),
     "ground_friction": Quantity("the ground's, likewise", ""),
     "sliding_friction": Quantity("coefficient of friction, all of it", ""),
+    "cone_friction": Quantity("coefficient of friction, nearly all of it", ""),
+    "slide_margin": Quantity("part of the friction that may be used where a contact rests", ""),
+    "slip_scale": Quantity("slip at which 0.7 of the friction acts against it", "length/s"),
     "torsion_radius": Quantity("of the torsional friction: largest moment over normal force", "length"),
     "torsion_margin": Quantity("part of the torsion that may be used where a contact rests", ""),
     "spin_scale": Quantity("spin at which 0.7 of the torsion acts against it", "rad/s"),

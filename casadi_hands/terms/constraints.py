@@ -117,6 +117,32 @@ TORSION_LAW = Constraint(
     ("torsion_shortfall", *_BALANCE),
 )
 
+SLIP_RATE = Constraint("slip_rate", "eq. 2.12: how fast the contact slides", "speed", "slide as planned", _PACE, _GAP)
+SLIDING_LAW = Constraint(
+    "law",
+    "f_t = μ f_n (φ + (1 - φ²) free part), φ which way the contact slides",
+    "force",
+    "slide with friction on its cone",
+    f"{_JOINTS}, or more friction",
+    ("slide_shortfall", "slip", *_BALANCE),
+)
+STICKING = Constraint(
+    "sticking",
+    "eq. 2.8: friction in use where the contact rests",
+    "",
+    "hold where it rests",
+    _HOLDING,
+    ("slide_shortfall",),
+)
+WITHIN_SLIP = Constraint(
+    "path",
+    "section 3.3.3: how far the contact slides from touch to lift",
+    "length",
+    "slide no farther than accepted",
+    f"{_JOINTS}, or limits.slip as wide as you can accept",
+    ("slip",),
+)
+
 # The same under a disturbance.
 DISTURBED_PRESSING = replace(PRESSING, cannot="keep pressing under the perturbation", advice=_DISTURBED, explains=())
 DISTURBED_CONE = replace(CONE, cannot="hold without slipping under the perturbation", advice=_DISTURBED, explains=())

@@ -180,6 +180,16 @@ def torsion_limit(pressing: SX, across: SX, friction: SX, rounding: float = 1e-6
     return ca.sqrt((left + ca.sqrt(left**2 + rounding**2)) / 2)
 
 
+def sliding(slip: SX, scale: SX) -> SX:
+    """Which way a contact slides (2,): 0 where it rests, a unit vector where it is far quicker than the scale.
+
+    Args:
+        slip: (2,) lengths/s.
+        scale: lengths/s.
+    """
+    return slip / ca.sqrt(ca.sumsqr(slip) + scale**2)
+
+
 def spinning(spin: SX, scale: SX) -> SX:
     """How much a contact spins, from -1 to 1: 0 where it rests, ±1 where it is far quicker than the scale, rad/s."""
     return spin / ca.sqrt(spin**2 + scale**2)

@@ -92,6 +92,7 @@ BUILD: dict[str, Callable[[], object]] = {
     "whole hand, drawing": lambda: WholeHandStage(drawing()[1], (0, 1), (1, 1), palm_moves=False),
     "refine": lambda: refine(everything()[1], (0, 1, 2), (2, 2, 3)),
     "refine, one finger": lambda: refine(everything()[1], (1,), (3,)),
+    "refine, sliding": lambda: refine(replace(everything()[1], sliding=0.4), (0, 1, 2), (2, 2, 3)),
     "refine, drawing": lambda: refine(drawing()[1], (0, 1), (3, 3)),
     "refine, one joint": lambda: refine(drawing()[1], (1, 0), (1, 1)),
 }

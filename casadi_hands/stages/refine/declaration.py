@@ -67,11 +67,14 @@ class Declaration:
         self.force = problem.variable("force", (count, width), -most, most)
         self.wrench = problem.variable("wrench", (count, 6))
         self.middle_torque = problem.variable("middle_torque", (count - 1, 3))
+        fingers = len(structure.contacts)
         if model.torsion:
-            fingers = len(structure.contacts)
             self.torsion = problem.variable("torsion", (count, fingers))
             self.spin = problem.variable("spin", (count - 1, fingers))
             self.twist_torque = problem.variable("twist_torque", (count, 3))
+        if model.sliding:
+            self.slip = problem.variable("slip", (count - 1, 2 * fingers))
+            self.sticking = problem.variable("sticking", (count - 1, 2 * fingers))
         if len(self.disturbed):
             shape = (len(self.disturbed), width)
             self.force_disturbed = problem.variable("force_disturbed", shape, -most, most, quantity="force")
@@ -100,6 +103,9 @@ class Declaration:
         widths |= {"bodies": width_of(structure.model.kinds)}
         if structure.model.torsion:
             widths |= {"torsion_radius": 1, "torsion_margin": 1, "sliding_friction": 1, "spin_scale": 1}
+        if structure.model.sliding:
+            widths |= {"sliding_friction": 1, "slide_margin": 1, "slip_scale": 1}
+            problem.parameter("cone_friction", (1, 1), quantity="friction")
         for name, width in widths.items():
             problem.parameter(name, (1, width))
         problem.parameter("step", (count - 1, 1))

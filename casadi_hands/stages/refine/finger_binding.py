@@ -32,7 +32,7 @@ def bind_contact(of: Declaration, i: int) -> None:
         point=point.take(touching),
         force=force.take(touching),
         angles=of.angles[i].take(touching),
-        friction=of.problem["friction"],
+        friction=of.problem["cone_friction" if structure.model.sliding else "friction"],
         **of.scene(c, touching),
         **of.of(c, touching, *names),
     )
@@ -74,8 +74,8 @@ def bind_rolling(of: Declaration, i: int) -> None:
     scenes = of.scene(c, start), of.scene(c, start + 1)
     of.bind(
         start,
-        kernels.rolling(n, kind, bool(structure.model.torsion)),
-        {"no_slip": FREE, "spin_rate": (0.0, 0.0)},
+        kernels.rolling(n, kind, bool(structure.model.torsion), bool(structure.model.sliding)),
+        {"no_slip": FREE, "slip_rate": (0.0, 0.0), "spin_rate": (0.0, 0.0)},
         (c,),
         f"rolling{c}",
         **_shape(of, i, start),
@@ -84,6 +84,7 @@ def bind_rolling(of: Declaration, i: int) -> None:
             for name, rows in (("pose", of.pose), ("point", point), ("angles", of.angles[i]))
         },
         **{name: (scenes[0][name], scenes[1][name]) for name in scenes[0]},
+        **({"slip": of.slip.take(start).entries(2 * i, 2 * i + 2, c)} if structure.model.sliding else {}),
         **({"spin": of.spin.take(start).entries(i, i + 1, c)} if structure.model.torsion else {}),
         **of.at(start, "step"),
         **of.of(c, start, "frames", "helper"),

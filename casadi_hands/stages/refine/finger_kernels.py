@@ -181,8 +181,8 @@ def _structural(touch: Touch, force: SX) -> SX:
 
 
 @cache
-def rolling(joints: int, kind: type[Body], soft: bool) -> Kernel:
-    """One contact from one knot to the next: no slip, and its spin costs; of soft tips it is a variable."""
+def rolling(joints: int, kind: type[Body], soft: bool, slides: bool = False) -> Kernel:
+    """One contact from one knot to the next: no slip, or as a variable; its spin costs, of soft tips as one, too."""
     kernel = Kernel("rolling")
     symbols = free_morphology(kernel, joints)
     poses, points, angles = [], [], []
@@ -200,10 +200,10 @@ def rolling(joints: int, kind: type[Body], soft: bool) -> Kernel:
     slip = ca.vertcat(ca.dot(first, over_object - over_link), ca.dot(second, over_object - over_link))
     kernel.constrain(limits.NO_SLIP, slip)
     kernel.cost(contact_terms.SLIP, slip / step)
-    relative_before = ca.mtimes(before.placed.tip_rotation.T, before.rotation)
-    relative_after = ca.mtimes(after.placed.tip_rotation.T, after.rotation)
-    change = ca.mtimes(relative_before.T, relative_after)
-    spin = contact_terms.spin(change, before.normal, step)
+    if slides:
+        kernel.constrain(limits.SLIP_RATE, slip / step - kernel.variable("slip", 2))
+    relative = [ca.mtimes(touch.placed.tip_rotation.T, touch.rotation) for touch in (before, after)]
+    spin = contact_terms.spin(ca.mtimes(relative[0].T, relative[1]), before.normal, step)
     kernel.cost(contact_terms.SPIN, spin)
     if soft:
         kernel.constrain(limits.SPIN_RATE, spin - kernel.variable("spin", 1))

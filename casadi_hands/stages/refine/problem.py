@@ -10,6 +10,7 @@ from casadi_hands.stages.refine.declaration import Block, Declaration
 from casadi_hands.stages.refine.finger_binding import bind_clearance, bind_contact, bind_pair, bind_rolling, bind_shape
 from casadi_hands.stages.refine.object_binding import bind_ground, bind_object, bind_physics
 from casadi_hands.stages.refine.restoration import Proximity
+from casadi_hands.stages.refine.sliding import bind as bind_sliding
 from casadi_hands.stages.refine.torsion import bind as bind_torsion
 
 
@@ -31,6 +32,8 @@ class RefineProblem(Declaration):
             bind_ground(self)
         if structure.model.torsion:
             bind_torsion(self)
+        if structure.model.sliding:
+            bind_sliding(self)
         for i in range(len(structure.contacts)):
             bind_contact(self, i)
             bind_rolling(self, i)

@@ -48,4 +48,17 @@ ALL_STEPS: tuple[Step, ...] = (
 # From an exact motion to one nearby; the first step can be left out where joints can follow and actuate the forces.
 NEARBY_STEPS: tuple[Step, ...] = (ALL_STEPS[1], ALL_STEPS[-1])
 LAST_STEP: tuple[Step, ...] = NEARBY_STEPS[-1:]
+# Of the slip with which friction is on its cone: with penalties, and of hard constraints one after another from there.
+VISCOUS = 100.0
+SHARPER = (VISCOUS, 30.0, 10.0, 3.0, 1.0)
 RENEWED_STEPS: tuple[Step, ...] = (("hard constraints", WEIGHTS | HARD, NEARBY),)
+
+
+def graded(steps: tuple[Step, ...]) -> tuple[tuple[Step, float], ...]:
+    """Steps for contacts that may slide, each with what multiplies the slip with which friction is on its cone.
+
+    Where nothing tells yet which contacts slide, and which way, friction is viscous at first and sharper step by step.
+    """
+    scales = SHARPER if len(steps) > 1 else SHARPER[-1:]
+    last = steps[-1]
+    return (*((step, VISCOUS) for step in steps[:-1]), *((last, scale) for scale in scales))

@@ -24,7 +24,8 @@ from casadi_hands.stages.own_terms import own_weights
 from casadi_hands.stages.refine.inter_knot import pass_through
 from casadi_hands.stages.refine.problem import RefineProblem
 from casadi_hands.stages.refine.result import Refined, Run, Worst
-from casadi_hands.stages.refine.settings import ACCEPTED, FALLING, GOOD, HOPELESS, MET, RESTORATION, SOFT, Step
+from casadi_hands.stages.refine.settings import ACCEPTED, FALLING, GOOD, HOPELESS, MET, RESTORATION, SOFT, Step, graded
+from casadi_hands.stages.refine.sliding import SLIP_SCALE
 from casadi_hands.stages.refine.values import Margin, RefineValues
 
 
@@ -103,16 +104,19 @@ class RefineStage:
         parameters, always = parameters | directions, always | regular
         runs: list[Run] = []
         slips: dict[str, float] = {}
-        most = 0.0
-        for what, given_weights, options in steps:
+        most, hopeless = 0.0, max(HOPELESS, self.model.sliding)
+        graded_steps = graded(steps) if self.model.sliding else tuple((step, 1.0) for step in steps)
+        for (what, given_weights, options), scale in graded_steps:
             weights = self._all_weights(given_weights)
             most, before = max(slips.values(), default=0.0), most
-            if what == "stiffer penalty" and not HOPELESS < most < FALLING * before:
+            if what == "stiffer penalty" and not hopeless < most < FALLING * before:
                 continue
-            if what == "hard constraints" and not most <= HOPELESS:  # nor where a solve broke down
+            if what == "hard constraints" and not most <= hopeless:  # nor where a solve broke down
+                break
+            if runs and runs[-1].what == what and not runs[-1].solution.violation <= ACCEPTED:
                 break
             bounds = always | exact if what == "hard constraints" else always
-            parameters |= self._weighted(weights)
+            parameters |= self._weighted(weights) | self._slip_scale(scale)
             solution = self.solver.solve(values, parameters, options, lower, upper, bounds)
             if what == "hard constraints" and not solution.violation <= MET:
                 solution = self._restored(solution, parameters, lower, upper, bounds)
@@ -157,6 +161,9 @@ class RefineStage:
 
     def _weighted(self, weights: Mapping[str, float]) -> dict[str, ArrayLike]:
         return {f"weight.{term}": weights[term] / self.given.knots for term in self.problem.terms}
+
+    def _slip_scale(self, times: float) -> dict[str, ArrayLike]:
+        return {"slip_scale": times * SLIP_SCALE / self.model.units.length} if self.model.sliding else {}
 
     def _slips(self, solution: Solution) -> dict[str, float]:
         """Path length of each finger contact's slip."""

@@ -17,6 +17,8 @@ from casadi_hands.stages.object_motion.values import MOST_TURN, tool_path
 from casadi_hands.stages.own_terms import own_values
 from casadi_hands.stages.refine.initial_guess import balanced, disturbance_wrenches, rates_and_wrenches
 from casadi_hands.stages.refine.problem import RefineProblem
+from casadi_hands.stages.refine.sliding import SLIP_SCALE, WHOLE, runs
+from casadi_hands.stages.refine.sliding import start as sliding_start
 
 Array = NDArray[np.float64]
 RAMP = 0.5  # s over which a contact that touches or lifts comes to press with its full force, or to let go
@@ -73,6 +75,11 @@ class RefineValues:
             # The point stays on the object's surface, where its force acts; the link may be a little off it.
             exact[f"contact{c}.on_link"] = (-model.gap_tolerance, model.gap_tolerance)
             slip = self._slip_allowed(i)
+            if model.sliding:
+                exact |= {f"slide{c}_{k}.path": (0.0, model.sliding) for k, _ in enumerate(runs(self._active[:-1, i]))}
+                # What resists a disturbance has the cone's margin: no contact slides then.
+                pushed = np.isin(np.flatnonzero(self._active[:-1, i]), [*self.disturbed, *self.disturbed - 1])
+                slip = np.where(pushed[:, None], slip, np.inf)
             exact[f"rolling{c}.no_slip"] = (-slip, slip)
             for block, factor in (("contact", 1.0), ("disturbed_contact", 1.0), ("inter_knot", ROUGHLY)):
                 if f"{block}{c}.structural" in self.problem.constraint_rows:
@@ -125,6 +132,9 @@ class RefineValues:
         upper = {"rate": rate, "force": bearing}
         if model.torsion:
             upper["torsion"] = np.where(self.bearing[:, : len(self.structure.contacts)], most, 0.0)
+        if model.sliding:
+            touching = self._active[:-1, : len(self.structure.contacts)]
+            upper |= dict.fromkeys(("slip", "sticking"), np.where(touching.repeat(2, axis=1), np.inf, 0.0))
         if len(self.disturbed):
             # A disturbance may begin with a touch, and what resists it is no force that has to grow.
             upper["force_disturbed"] = active[self.disturbed]
@@ -149,6 +159,10 @@ class RefineValues:
             spins, torsion, twist = self._torsion(motion)
             values |= {"spin": spins, "torsion": torsion, "twist_torque": twist}
             values["wrench"][:, 3:] += twist
+        if self.model.sliding:
+            contacts = self.structure.contacts
+            helpers = [_helpers(motion.point[:, c], self.model.touched[c]) for c in contacts]
+            values |= sliding_start(self.model, motion, np.array(helpers), self._active)
         at, pushing, twisting = ((a[1:] + a[:-1]) / 2 for a in (points, forces, twist))
         values["middle_torque"] = np.cross(at, pushing).sum(axis=1) + twisting
         if len(k := self.disturbed):
@@ -198,6 +212,9 @@ class RefineValues:
         if model.torsion:
             values |= {"torsion_radius": model.torsion, "torsion_margin": margin.friction}
             values |= {"sliding_friction": model.friction, "spin_scale": SPIN_SCALE}
+        if model.sliding:
+            values |= {"sliding_friction": model.friction, "cone_friction": WHOLE * model.friction}
+            values |= {"slide_margin": margin.friction, "slip_scale": SLIP_SCALE / model.units.length}
         values |= own_values(self.problem, model)
         if model.disturbance is not None and len(self.disturbed):
             values["external_force"] = model.disturbance.force[self.disturbed]
