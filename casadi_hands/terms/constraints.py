@@ -102,7 +102,7 @@ SPIN_RATE = Constraint(
 )
 TORSION_CONE = Constraint(
     "torsion_cone",
-    "(f_t / μ)² + (m / ρ)² <= f_n²",
+    "(f_t / μ)² + t² <= f_n²",
     "",
     "hold against a twist and a pull at once",
     _HOLDING,
