@@ -79,7 +79,7 @@ GRIP = Term(
     "Normal force, which stiffness has to make up for",
     "",
     "m·g",
-    weights={"refine": Weight(0.03, "knot")},
+    weights={"refine": Weight(0.05, "knot")},
 )
 FRICTION_MARGIN = Term(
     "friction_margin",
@@ -163,6 +163,11 @@ def spin(change: SX, normal: SX, step: SX) -> SX:
     """Rate of turn about a normal (3,), rad/s, of a change of orientation (3, 3) in one step."""
     turned = ca.vertcat(change[2, 1] - change[1, 2], change[0, 2] - change[2, 0], change[1, 0] - change[0, 1]) / 2
     return ca.dot(turned, normal) / step
+
+
+def pivoting(spin: SX, quick: float = 0.05) -> SX:
+    """Residual whose square is the spin's size, rad/s, and quadratic where it is slow: a contact stays or it pivots."""
+    return spin / ca.sqrt(ca.sqrt(spin**2 + quick**2))
 
 
 def torsion_limit(pressing: SX, across: SX, friction: SX, rounding: float = 1e-6) -> SX:

@@ -204,7 +204,7 @@ def rolling(joints: int, kind: type[Body], soft: bool, slides: bool = False) -> 
         kernel.constrain(limits.SLIP_RATE, slip / step - kernel.variable("slip", 2))
     relative = [ca.mtimes(touch.placed.tip_rotation.T, touch.rotation) for touch in (before, after)]
     spin = contact_terms.spin(ca.mtimes(relative[0].T, relative[1]), before.normal, step)
-    kernel.cost(contact_terms.SPIN, spin)
+    kernel.cost(contact_terms.SPIN, contact_terms.pivoting(spin) if soft else spin)
     if soft:
         kernel.constrain(limits.SPIN_RATE, spin - kernel.variable("spin", 1))
     return kernel

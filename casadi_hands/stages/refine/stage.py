@@ -24,7 +24,18 @@ from casadi_hands.stages.own_terms import own_weights
 from casadi_hands.stages.refine.inter_knot import pass_through
 from casadi_hands.stages.refine.problem import RefineProblem
 from casadi_hands.stages.refine.result import Refined, Run, Worst
-from casadi_hands.stages.refine.settings import ACCEPTED, FALLING, GOOD, HOPELESS, MET, RESTORATION, SOFT, Step, graded
+from casadi_hands.stages.refine.settings import (
+    ACCEPTED,
+    FALLING,
+    GOOD,
+    HOPELESS,
+    MET,
+    RESTORATION,
+    SPIN_SCALE,
+    SPIN_WEIGHT,
+    Step,
+    graded,
+)
 from casadi_hands.stages.refine.sliding import SLIP_SCALE
 from casadi_hands.stages.refine.values import Margin, RefineValues
 
@@ -107,7 +118,7 @@ class RefineStage:
         most, hopeless = 0.0, max(HOPELESS, self.model.sliding)
         graded_steps = graded(steps) if self.model.sliding else tuple((step, 1.0) for step in steps)
         for (what, given_weights, options), scale in graded_steps:
-            weights = self._all_weights(given_weights)
+            weights = self._all_weights(what, given_weights)
             most, before = max(slips.values(), default=0.0), most
             if what == "stiffer penalty" and not hopeless < most < FALLING * before:
                 continue
@@ -116,7 +127,7 @@ class RefineStage:
             if runs and runs[-1].what == what and not runs[-1].solution.violation <= ACCEPTED:
                 break
             bounds = always | exact if what == "hard constraints" else always
-            parameters |= self._weighted(weights) | self._slip_scale(scale)
+            parameters |= self._weighted(weights) | self._slip_scale(scale) | self._spin_scale(what)
             solution = self.solver.solve(values, parameters, options, lower, upper, bounds)
             if what == "hard constraints" and not solution.violation <= MET:
                 solution = self._restored(solution, parameters, lower, upper, bounds)
@@ -151,16 +162,20 @@ class RefineStage:
 
     def costs(self, step: Step, start: WholeHand, margin: Margin) -> dict[str, float]:
         """The weighted terms of a motion, as a step weights them."""
-        weights = self._all_weights(step[1])
+        weights = self._all_weights(step[0], step[1])
         parameters = self.given.parameters(start, margin) | self._weighted(weights)
         return self.solver.evaluate(self.given.start(start), parameters)
 
-    def _all_weights(self, weights: Mapping[str, float]) -> dict[str, float]:
+    def _all_weights(self, what: str, weights: Mapping[str, float]) -> dict[str, float]:
         """A step's weights, those of soft fingertips, and those of a person's own terms."""
-        return {**weights, **(SOFT if self.model.torsion else {}), **own_weights(self.model, "refine")}
+        soft = {"spin": SPIN_WEIGHT[what]} if self.model.torsion else {}
+        return {**weights, **soft, **own_weights(self.model, "refine")}
 
     def _weighted(self, weights: Mapping[str, float]) -> dict[str, ArrayLike]:
         return {f"weight.{term}": weights[term] / self.given.knots for term in self.problem.terms}
+
+    def _spin_scale(self, what: str) -> dict[str, ArrayLike]:
+        return {"spin_scale": SPIN_SCALE[what]} if self.model.torsion else {}
 
     def _slip_scale(self, times: float) -> dict[str, ArrayLike]:
         return {"slip_scale": times * SLIP_SCALE / self.model.units.length} if self.model.sliding else {}

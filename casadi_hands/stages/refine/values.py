@@ -17,6 +17,7 @@ from casadi_hands.stages.object_motion.values import MOST_TURN, tool_path
 from casadi_hands.stages.own_terms import own_values
 from casadi_hands.stages.refine.initial_guess import balanced, disturbance_wrenches, rates_and_wrenches
 from casadi_hands.stages.refine.problem import RefineProblem
+from casadi_hands.stages.refine.settings import SPIN_SCALE
 from casadi_hands.stages.refine.sliding import SLIP_SCALE, WHOLE, runs
 from casadi_hands.stages.refine.sliding import start as sliding_start
 
@@ -25,7 +26,7 @@ RAMP = 0.5  # s over which a contact that touches or lifts comes to press with i
 TOOL_TOLERANCE = 5e-3  # lengths, how far a drawing's tool may leave its path between goals
 LIFTING_TIE = 2.0  # of a contact to where it was planned, where it lets go in order to touch elsewhere
 SLIDING_TIE = 0.3  # of a contact to where it was planned to slide; it shall roll if it can
-SPIN_SCALE = 0.05  # rad/s: a contact that spins quicker has its torsion at the limit, or nearly so
+TORSION_MARGIN = 0.4  # share of its torsion that a contact at rest may need: tips differ, and age
 ROUGHLY = 10.0  # times of what no joint may supply at knots may be so between them, where motions are interpolated
 Bounds = dict[str, tuple[ArrayLike, ArrayLike]]
 
@@ -210,8 +211,8 @@ class RefineValues:
         }
         values |= self.proximity.idle
         if model.torsion:
-            values |= {"torsion_radius": model.torsion, "torsion_margin": margin.friction}
-            values |= {"sliding_friction": model.friction, "spin_scale": SPIN_SCALE}
+            values |= {"torsion_radius": model.torsion, "torsion_margin": TORSION_MARGIN}
+            values |= {"sliding_friction": model.friction, "spin_scale": SPIN_SCALE["hard constraints"]}
         if model.sliding:
             values |= {"sliding_friction": model.friction, "cone_friction": WHOLE * model.friction}
             values |= {"slide_margin": margin.friction, "slip_scale": SLIP_SCALE / model.units.length}
