@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from casadi_hands.geometry.bodies.capsule import Capsule
-from casadi_hands.geometry.contact_points import on_bodies
+from casadi_hands.geometry.contact_points import on_bodies, rounded_normals
 from casadi_hands.kinematics.numeric import link_frames
 from casadi_hands.problem.floating_motion import Floating
 from casadi_hands.problem.hand_motion import WholeHand
@@ -62,14 +62,14 @@ def whole_hand_motion(model: Model, result: WholeHand) -> Motion:
     angles = np.hstack(result.angles) if result.angles else np.zeros((count, 0))
     joint_names = tuple(f"finger{i}_joint{j}" for i, f in enumerate(result.fingers) for j in range(f.joints))
     object_pose, palm = (result.position, result.vector), (result.palm_position, result.palm_quaternion)
-    whole = point
     touch = [c for c, link in enumerate(links) if link != "none"]
     contacts = tuple(names[c] for c in touch), [links[c] for c in touch]
     active, force, point, on_link = result.active[:, touch], result.force[:, touch], point[:, touch], on_link[:, touch]
     motion = motion_in_si(model, *object_pose, *palm, angles, joint_names, *contacts, active, force, point, on_link)
     if result.torsion is not None:
-        normals = np.array([[b.outward(p) for b, p in zip(model.touched, row, strict=True)] for row in whole[:, :]])
-        moments = model.torsion * result.torsion[:, touch, None] * normals[:, touch]
+        # As physics had them: where contacts pass a kink of the surface, true normals turn at once.
+        normals = np.stack([rounded_normals(point[:, k], model.touched[c]) for k, c in enumerate(touch)], axis=1)
+        moments = model.torsion * result.torsion[:, touch, None] * normals
         turns = np.array([object_rotation(model, v) for v in result.vector])
         motion = replace(motion, contact_moment=np.einsum("sij,scj->sci", turns, moments) * model.units.torque)
     disturbance = model.disturbance

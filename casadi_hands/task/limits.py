@@ -30,7 +30,7 @@ class Limits(Section):
         default=0.0, description="Normal force by which a contact would have to suck, over weight."
     )
     torsion_excess: NonNegative = Field(
-        default=1e-3,
+        default=0.01,
         description="Torsional moment beyond what a fingertip bears beside its force: over its radius, over weight.",
     )
     torsion_shortfall: NonNegative = Field(
