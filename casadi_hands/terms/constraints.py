@@ -117,7 +117,7 @@ TORSION_LAW = Constraint(
     ("torsion_shortfall", *_BALANCE),
 )
 
-SLIP_RATE = Constraint("slip_rate", "eq. 2.12: how fast the contact slides", "speed", "slide as planned", _PACE, _GAP)
+SLIP_RATE = Constraint("slip_rate", "eq. 2.12: how fast the contact slides", "", "slide as planned", _PACE, _GAP)
 SLIDING_LAW = Constraint(
     "law",
     "f_t = μ f_n (φ + (1 - φ²) free part), φ which way the contact slides",

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from casadi_hands import solve
 from casadi_hands.geometry.bodies.capsule import Capsule
 from casadi_hands.geometry.bodies.sphere import Sphere
 from casadi_hands.problem.si import build_model
@@ -189,3 +191,41 @@ def test_runs_are_the_stretches_of_set_flags() -> None:
     flags = np.array([True, True, False, True, False, False, True])
     assert [run.tolist() for run in runs(flags)] == [[0, 1], [3], [6]]
     assert runs(np.zeros(3, bool)) == []
+
+
+# A solve. A post stands on the ground while the palm rises farther than the links reach: fingertips slide up along it.
+
+POST = """
+object: {mass: 0.3, shapes: [{capsule: {start: [0, 0, -0.05], end: [0, 0, 0.05], radius: 0.015}}]}
+palm:
+  radius: 0.05
+  position: [0, 0, 0.16]
+  facing: [0, 0, -1]
+  motion: [{at: 1.5, position: [0, 0, 0.205]}]
+ground: {height: 0}
+motion: [{at: 0, position: [0, 0, 0.065]}, {at: 1.5, position: [0, 0, 0.065]}]
+fingers:
+  thumb: {touches: [0.015, 0, 0.02]}
+  index: {touches: [-0.0075, 0.013, 0.02]}
+  middle: {touches: [-0.0075, -0.013, 0.02]}
+friction: 0.5
+hand: {link_length: [0.01, 0.05]}
+search: {max_joints: 2}
+"""
+
+
+@pytest.mark.slow
+def test_fingers_too_short_to_hold_on_slide_and_are_certified_where_the_task_allows_it(tmp_path: Path) -> None:
+    strict = solve(parse_task(POST), jobs=1, out=tmp_path / "strict")
+    assert strict.status != "certified"
+    assert {"slip", "slide_shortfall"} <= {name for name, figure in strict.certificate.items() if not figure["holds"]}
+    loose = solve(parse_task(POST + "limits: {slip: 0.05}\n"), jobs=1, out=tmp_path / "loose")
+    assert loose.status == "certified"
+    assert 0.006 < loose.certificate["slip"]["value"] < 0.03
+    assert "slides at" in loose.certificate["slide_shortfall"]["where"]
+    assert loose.certificate["slide_shortfall"]["value"] < 0.05
+    motion = loose.motion
+    assert motion is not None
+    # All three drag the post up in the middle of the way, with all of their friction.
+    force = motion.contact_force[len(motion.time) // 2, :3]
+    np.testing.assert_allclose(force[:, 2] / np.linalg.norm(force[:, :2], axis=1), 0.5, rtol=0.05)
