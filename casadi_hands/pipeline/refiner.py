@@ -87,6 +87,12 @@ class Refiner:
             if design.status == "certified":
                 judged, refined, stage = design, other, halved
         judged = self._replayed(judged)
+        if refined.exact and self.model.torsion and judged.replay_angle > AIM:
+            with self.record.stage("refine", f"again, slow spins resisted in full: {judged.replay_words}"):
+                sharp = self._attempt(whole, refined.margin, partial(stage.sharpened, refined))
+            design = self._replayed(self._judged(stage.model, sharp, short, planned))
+            if rank_of(design) < rank_of(judged):
+                judged, refined = design, sharp
         another, which = largest, "firmer"
         if judged.least_stiffness > HARDLY * self.record.task.actuator.stiffness:
             another, which = margins.softer, "softer"

@@ -60,7 +60,7 @@ _QUANTITIES = {
     "slide_margin": Quantity("part of the friction that may be used where a contact rests", ""),
     "slip_scale": Quantity("slip at which 0.7 of the friction acts against it", "length/s"),
     "torsion_radius": Quantity("of the torsional friction: largest moment over normal force", "length"),
-    "torsion_margin": Quantity("part of the torsion that may be used where a contact rests", ""),
+    "holding": Quantity("share of a fingertip's torsion that balance asks for, of what its spin leaves free", ""),
     "spin_scale": Quantity("spin at which 0.7 of the torsion acts against it", "rad/s"),
     "sharpness": Quantity("exponent of the friction cone's penalty", "1/(m·g)"),
     "patches": Quantity("where contacts are wanted; object frame", "length"),

@@ -20,7 +20,14 @@ from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.resampling import at_rest, extrapolated, on_palm, resampled, resampled_model
 from casadi_hands.stages.refine.result import Refined, Run
-from casadi_hands.stages.refine.settings import ALL_STEPS, LAST_STEP, NEARBY_STEPS, RENEWED_STEPS, STIFF_PENALTY, Step
+from casadi_hands.stages.refine.settings import (
+    ALL_STEPS,
+    LAST_STEP,
+    NEARBY_STEPS,
+    RENEWED_STEPS,
+    STIFF_PENALTY,
+    Step,
+)
 from casadi_hands.stages.refine.stage import RefineStage
 from casadi_hands.stages.refine.values import Margin
 
@@ -102,6 +109,15 @@ class Continuation:
             margin: to keep to the limits.
         """
         return _until_met(partial(self.fine.take, steps, start, margin) for steps in (RENEWED_STEPS, LAST_STEP))
+
+    def sharpened(self, exact: Refined, margin: Margin) -> Refined:
+        """Refine an exact motion such that contacts which spin slowly have their torsion at its limit, too.
+
+        Args:
+            exact: the motion, at the task's samples.
+            margin: to keep to the limits.
+        """
+        return replace(self.fine.take(LAST_STEP, exact.hand, margin, sharp=True), barely_rolls=exact.barely_rolls)
 
     def with_margin(self, exact: Refined, margin: Margin) -> Refined:
         """Refine a motion that is exact with another margin.

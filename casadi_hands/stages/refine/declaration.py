@@ -17,6 +17,7 @@ from casadi_hands.problem.structure import Structure
 from casadi_hands.stages.synthesis.stage import AXIS_RANGE
 
 JOINT_MARGIN = 0.005  # rad, so that a smooth curve through the knots stays within the limits between them
+HOLDING = 0.4  # share of its torsion that a contact at rest may need: tips differ, and age
 FREE = (-np.inf, np.inf)
 IN_CONE = {"pressing": (0.0, np.inf), "cone": (0.0, np.inf)}
 Knots = NDArray[np.int64]
@@ -71,6 +72,7 @@ class Declaration:
         if model.torsion:
             self.torsion = problem.variable("torsion", (count, fingers))
             self.spin = problem.variable("spin", (count - 1, fingers))
+            self.holding = problem.variable("holding", (count - 1, fingers), -HOLDING, HOLDING)
             self.twist_torque = problem.variable("twist_torque", (count, 3))
         if model.sliding:
             self.slip = problem.variable("slip", (count - 1, 2 * fingers))
@@ -102,7 +104,7 @@ class Declaration:
         widths |= {"palm_radius": 1, "ground_height": 1, "friction": 1}
         widths |= {"bodies": width_of(structure.model.kinds)}
         if structure.model.torsion:
-            widths |= {"torsion_radius": 1, "torsion_margin": 1, "sliding_friction": 1, "spin_scale": 1}
+            widths |= {"torsion_radius": 1, "sliding_friction": 1, "spin_scale": 1}
         if structure.model.sliding:
             widths |= {"sliding_friction": 1, "slide_margin": 1, "slip_scale": 1}
             problem.parameter("cone_friction", (1, 1), quantity="friction")

@@ -15,7 +15,8 @@ from casadi_hands.nlp import Kernel, Parameter, Problem, Rows
 from casadi_hands.nlp.layout import Label
 from casadi_hands.terms.finger import PROXIMITY
 
-FOLLOWING = ("rate", "wrench", "middle_torque", "spin", "twist_torque", "slip", "sticking")  # what all else decides
+# What all else decides.
+FOLLOWING = ("rate", "wrench", "middle_torque", "spin", "holding", "twist_torque", "slip", "sticking")
 FORCE_SHARE = 0.1  # lengths that are as far to go as a force of one weight
 
 

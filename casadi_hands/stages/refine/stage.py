@@ -31,6 +31,7 @@ from casadi_hands.stages.refine.settings import (
     HOPELESS,
     MET,
     RESTORATION,
+    SHARP,
     SPIN_SCALE,
     SPIN_WEIGHT,
     Step,
@@ -97,6 +98,7 @@ class RefineStage:
         margin: Margin,
         homotopy: float = 1.0,
         wanted: WholeHand | None = None,
+        sharp: bool = False,
     ) -> Refined:
         """Solve step by step; not to the end where stiff penalties show rolling to be out of reach.
 
@@ -106,6 +108,7 @@ class RefineStage:
             margin: to keep to the limits.
             homotopy: the parameter: 0 where the object stays at its first goal, 1 where it reaches all of them.
             wanted: the motion, of the same hand, that costs hold near to; by default that to begin with.
+            sharp: whether contacts that spin slowly have their torsion at its limit, too.
         """
         given = self.given if homotopy == 1 else RefineValues(self.built, shortened(self.model, homotopy))
         values, parameters = given.start(start), given.parameters(start, margin, wanted)
@@ -127,7 +130,7 @@ class RefineStage:
             if runs and runs[-1].what == what and not runs[-1].solution.violation <= ACCEPTED:
                 break
             bounds = always | exact if what == "hard constraints" else always
-            parameters |= self._weighted(weights) | self._slip_scale(scale) | self._spin_scale(what)
+            parameters |= self._weighted(weights) | self._slip_scale(scale) | self._spin_scale(what, sharp)
             solution = self.solver.solve(values, parameters, options, lower, upper, bounds)
             if what == "hard constraints" and not solution.violation <= MET:
                 solution = self._restored(solution, parameters, lower, upper, bounds)
@@ -174,8 +177,8 @@ class RefineStage:
     def _weighted(self, weights: Mapping[str, float]) -> dict[str, ArrayLike]:
         return {f"weight.{term}": weights[term] / self.given.knots for term in self.problem.terms}
 
-    def _spin_scale(self, what: str) -> dict[str, ArrayLike]:
-        return {"spin_scale": SPIN_SCALE[what]} if self.model.torsion else {}
+    def _spin_scale(self, what: str, sharp: bool) -> dict[str, ArrayLike]:
+        return {"spin_scale": SHARP if sharp else SPIN_SCALE[what]} if self.model.torsion else {}
 
     def _slip_scale(self, times: float) -> dict[str, ArrayLike]:
         return {"slip_scale": times * SLIP_SCALE / self.model.units.length} if self.model.sliding else {}

@@ -69,18 +69,18 @@ def cone(kind: type[Body]) -> Kernel:
 def law(kind: type[Body]) -> Kernel:
     """One contact's torsion from one knot to the next: at its limit against the spin, of a free size at rest.
 
-    Constraints: ``torsion_law`` (2: room of the free part on either side).
+    Constraints: ``torsion_law`` (1). ``holding`` is the share of the torsion that spin leaves free, bounded.
     """
     kernel = Kernel("torsion_law")
     forces = [kernel.variable(f"force{i}", 3, "force", i) for i in range(2)]
     points = [kernel.variable(f"point{i}", 3, "point", i) for i in range(2)]
     torsions = [kernel.variable(f"torsion{i}", 1, "torsion", i) for i in range(2)]
     spin, body = kernel.variable("spin", 1), kernel.parameter("body", kind.width)
-    friction, margin = kernel.parameter("sliding_friction"), kernel.parameter("torsion_margin")
+    friction, holding = kernel.parameter("sliding_friction"), kernel.variable("holding", 1)
     fully = contact_terms.spinning(spin, kernel.parameter("spin_scale"))
     most = sum(_limit(f, p, body, kind, friction) for f, p in zip(forces, points, strict=True)) / 2
-    free, room = (torsions[0] + torsions[1]) / 2 + most * fully, margin * most * (1 - fully**2)
-    kernel.constrain(limits.TORSION_LAW, ca.vertcat(room - free, room + free))
+    mean = (torsions[0] + torsions[1]) / 2
+    kernel.constrain(limits.TORSION_LAW, mean + most * (fully - (1 - fully**2) * holding))
     return kernel
 
 
@@ -120,7 +120,7 @@ def bind(of: Declaration) -> None:
         of.bind(
             start,
             law(kinds[i]),
-            {"torsion_law": (0, np.inf)},
+            {"torsion_law": (0, 0)},
             (c,),
             f"torsion_law{c}",
             **{
@@ -129,6 +129,7 @@ def bind(of: Declaration) -> None:
             },
             spin=of.spin.take(start).entries(i, i + 1, c),
             **shared,
-            **problem.given("torsion_margin", "spin_scale"),
+            holding=of.holding.take(start).entries(i, i + 1, c),
+            **problem.given("spin_scale"),
             **of.of(c, start, "body"),
         )

@@ -15,6 +15,7 @@ from casadi_hands.problem.model import Model
 from casadi_hands.problem.placement import contact_jacobians, contact_spins
 from casadi_hands.stages.object_motion.values import MOST_TURN, tool_path
 from casadi_hands.stages.own_terms import own_values
+from casadi_hands.stages.refine.declaration import HOLDING
 from casadi_hands.stages.refine.initial_guess import balanced, disturbance_wrenches, rates_and_wrenches
 from casadi_hands.stages.refine.problem import RefineProblem
 from casadi_hands.stages.refine.settings import SPIN_SCALE
@@ -26,7 +27,6 @@ RAMP = 0.5  # s over which a contact that touches or lifts comes to press with i
 TOOL_TOLERANCE = 5e-3  # lengths, how far a drawing's tool may leave its path between goals
 LIFTING_TIE = 2.0  # of a contact to where it was planned, where it lets go in order to touch elsewhere
 SLIDING_TIE = 0.3  # of a contact to where it was planned to slide; it shall roll if it can
-TORSION_MARGIN = 0.4  # share of its torsion that a contact at rest may need: tips differ, and age
 ROUGHLY = 10.0  # times of what no joint may supply at knots may be so between them, where motions are interpolated
 Bounds = dict[str, tuple[ArrayLike, ArrayLike]]
 
@@ -157,8 +157,8 @@ class RefineValues:
         }
         twist = np.zeros((count, 3))
         if self.model.torsion:
-            spins, torsion, twist = self._torsion(motion)
-            values |= {"spin": spins, "torsion": torsion, "twist_torque": twist}
+            values |= self._torsion(motion, forces)
+            twist = values["twist_torque"]
             values["wrench"][:, 3:] += twist
         if self.model.sliding:
             contacts = self.structure.contacts
@@ -175,16 +175,23 @@ class RefineValues:
             values[f"axes{c}"] = finger.axes.reshape(1, -1)
         return values
 
-    def _torsion(self, motion: WholeHand) -> tuple[Array, Array, Array]:
-        """Spin (S - 1, F), rad/s, of each finger's contact, torsion over its radius (S, F) and its torque (S, 3)."""
+    def _torsion(self, motion: WholeHand, forces: Array) -> dict[str, Array]:
+        """Values of what fingertips' torsion is made of, beside contact forces (S, C, 3)."""
         model, contacts = self.model, list(self.structure.contacts)
-        steps = np.diff(model.schedule.samples)
-        torsion = np.zeros((self.knots, len(contacts)))
+        count, steps = len(contacts), np.diff(model.schedule.samples)
+        torsion = np.zeros((self.knots, count))
         if motion.torsion is not None:
-            torsion = np.where(self.bearing[:, : len(contacts)], motion.torsion[:, contacts], 0.0)
+            torsion = np.where(self.bearing[:, :count], motion.torsion[:, contacts], 0.0)
         normals = np.array([[model.touched[c].outward(p) for p in motion.point[:, c]] for c in contacts])
-        spins = [contact_spins(model, motion, i, n) / steps for i, n in enumerate(normals)]
-        return np.array(spins).T, torsion, model.torsion * np.einsum("sf,fsi->si", torsion, normals)
+        spins = np.array([contact_spins(model, motion, i, n) / steps for i, n in enumerate(normals)]).T
+        pressing = -np.einsum("sfi,fsi->sf", forces[:, :count], normals)
+        across = np.sum(forces[:, :count] ** 2, axis=2) - pressing**2
+        most = np.sqrt(np.maximum(pressing**2 - across / model.friction**2, 1e-6))
+        share = ((torsion / most)[1:] + (torsion / most)[:-1]) / 2
+        fully = spins / np.sqrt(spins**2 + SPIN_SCALE["hard constraints"] ** 2)
+        holding = np.clip((share + fully) / (1 - fully**2), -HOLDING, HOLDING)
+        twist = model.torsion * np.einsum("sf,fsi->si", torsion, normals)
+        return {"spin": spins, "torsion": torsion, "holding": holding, "twist_torque": twist}
 
     def parameters(self, motion: WholeHand, margin: Margin, wanted: WholeHand | None = None) -> dict[str, ArrayLike]:
         """Values of all parameters but the weights; costs hold a motion near to the wanted one, by default itself."""
@@ -211,7 +218,7 @@ class RefineValues:
         }
         values |= self.proximity.idle
         if model.torsion:
-            values |= {"torsion_radius": model.torsion, "torsion_margin": TORSION_MARGIN}
+            values |= {"torsion_radius": model.torsion}
             values |= {"sliding_friction": model.friction, "spin_scale": SPIN_SCALE["hard constraints"]}
         if model.sliding:
             values |= {"sliding_friction": model.friction, "cone_friction": WHOLE * model.friction}

@@ -15,7 +15,7 @@ from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.report import Figure, worse
 from casadi_hands.verify.trajectory import DENSITY, Trajectory
 
-SPINNING = 0.3
+SPINNING = 0.8
 """rad/s: a contact that turns quicker on the object slides there."""
 LEAST = 0.05
 """Of the weight: a limit below which nothing is asked of the moment."""

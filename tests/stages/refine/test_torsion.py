@@ -105,21 +105,20 @@ def test_the_law_leaves_moments_free_at_rest_and_none_where_contacts_spin(kind: 
     rng = np.random.default_rng(2)
     points = [near(body, rng) for _ in range(2)]
     forces = [pressed(point, body, rng) for point in points]
-    torsions, margin, scale = rng.uniform(-1, 1, 2), 0.4, 0.05
-    variables: dict[str, object] = {"spin": spin}
+    torsions, holding, scale = rng.uniform(-1, 1, 2), float(rng.uniform(-0.4, 0.4)), 0.05
+    variables: dict[str, object] = {"spin": spin, "holding": holding}
     for i in range(2):
         variables |= {f"force{i}": forces[i], f"point{i}": points[i], f"torsion{i}": torsions[i]}
-    parameters = {"body": body, "sliding_friction": 0.6, "torsion_margin": margin, "spin_scale": scale}
-    rooms = numbers(torsion.law(kind), variables, parameters)["torsion_law"]
+    parameters = {"body": body, "sliding_friction": 0.6, "spin_scale": scale}
+    off = numbers(torsion.law(kind), variables, parameters)["torsion_law"]
     limit = np.mean([most(f, p, body, 0.6) for f, p in zip(forces, points, strict=True)])
     share = spin / np.hypot(spin, scale)  # of the limit that acts against the spin
-    off = torsions.mean() + limit * share
-    free = margin * limit * (1 - share**2)
-    assert rooms == pytest.approx([free - off, free + off], abs=1e-5)
+    due = -limit * share + limit * (1 - share**2) * holding
+    assert off == pytest.approx([torsions.mean() - due], abs=1e-5)
     check_block(torsion.law(kind), variables, parameters)
-    # With no room on either side there is one moment: at the limit against the spin.
+    # Where it spins fast there is one moment: at the limit against the spin.
     if abs(spin) > 1.0:
-        assert free < 0.001 * limit
+        assert due == pytest.approx(-np.sign(spin) * limit, rel=1e-3)
 
 
 # A ball with its centre of mass far below its centre hangs between two fingertips, tilted, and is let down: what turns
@@ -262,6 +261,6 @@ def test_hard_points_have_the_same_problem_as_ever() -> None:
     rows = {name.partition(".")[2] for name in set(soft.constraint_rows) - set(hard.constraint_rows)}
     assert rows == {"torsion", "torsion_cone", "torsion_law", "spin_rate"}
     assert set(hard.constraint_rows) <= set(soft.constraint_rows)
-    assert set(soft.parameters.names()) - set(hard.parameters.names()) >= {"torsion_radius", "torsion_margin"}
+    assert set(soft.parameters.names()) - set(hard.parameters.names()) >= {"torsion_radius", "spin_scale"}
     assert contact.TORSION.name in soft.terms
     assert contact.TORSION.name not in hard.terms
