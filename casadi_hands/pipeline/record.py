@@ -35,12 +35,21 @@ class Progress:
     elapsed: float
 
 
+AIM = 3.0  # deg from any goal in the replay as planned, beyond which more is tried
+
+
 def rank_of(design: Design) -> tuple[float, ...]:
-    """How far a judged design is from certified: limits missed by files, in replays, drops, stiffness it asks for."""
+    """How far a judged design is from what is aimed at, best first.
+
+    By limits that the files miss, limits that replays miss, drops, turns from goals beyond `AIM`, and the stiffness that
+    the grasp asks for.
+    """
     in_replays = design.missed_in_replays
     missed = len(design.missed) - len(in_replays)
+    played = (math.inf, math.inf, math.inf)
+    if design.drops is not None:
+        played = len(in_replays), design.drops, max(design.replay_angle, AIM)
     stiffness = design.certificate.get("least_stiffness", {}).get("value")
-    played = (math.inf, math.inf) if design.drops is None else (len(in_replays), design.drops)
     return missed, *played, math.inf if stiffness is None else stiffness
 
 

@@ -13,7 +13,7 @@ from casadi_hands.diagnosis.refinement import own_reasons, refined_reason
 from casadi_hands.export.design import Design
 from casadi_hands.pipeline.judge import Judge
 from casadi_hands.pipeline.margins import SMALL, margins_for
-from casadi_hands.pipeline.record import Record, rank_of
+from casadi_hands.pipeline.record import AIM, Record, rank_of
 from casadi_hands.pipeline.steps import adopt
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
@@ -32,7 +32,6 @@ FINEST = 0.02  # s between samples
 ENOUGH = 0.7  # of a limit: intervals that contribute more are halved
 LEFT = 1 / 8  # of what an interval slips, once it is halved; a cubic spline's error falls to a sixteenth
 HARDLY = 0.3  # of the joints' stiffness: a grasp that asks for more is lost where joints are a little softer
-AIM = 3.0  # deg from any goal in the replay as planned, beyond which another margin is tried
 GAIN = 0.8  # of how far limits are missed, that more samples must reach to be worth still more
 
 
