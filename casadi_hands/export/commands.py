@@ -23,7 +23,7 @@ def commanded(task: Task, hand: Hand, motion: Motion) -> Motion:
     """The motion with the velocities, torques and commands of its joints.
 
     Args:
-        task: gives the motors' load.
+        task: names the motors.
         hand: whose joints the motion moves.
         motion: of that hand.
     """

@@ -41,8 +41,8 @@ AIM = 3.0  # deg from any goal in the replay as planned, beyond which more is tr
 def rank_of(design: Design) -> tuple[float, ...]:
     """How far a judged design is from what is aimed at, best first.
 
-    By limits that the files miss, limits that replays miss, drops, turns from goals beyond `AIM`, and the stiffness that
-    the grasp asks for.
+    By limits that the files miss, limits that replays miss, drops, turns from goals beyond `AIM`, and the stiffness
+    that the grasp asks for.
     """
     in_replays = design.missed_in_replays
     missed = len(design.missed) - len(in_replays)

@@ -18,6 +18,7 @@ from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
+from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.verify.figures.closest import closest_to_capsule, level_directions, lowest_points
@@ -228,7 +229,11 @@ class Stability:
         """Return what springs must make up for (d, d) along a null space (6 + J, d) at a sample."""
         moved = space[6:]
         free, springy = _split(moved.T @ moved)
-        alone = float(np.linalg.eigvalsh(free.T @ needed @ free).max()) if free.shape[1] else 0.0
+        alone = 0.0
+        if free.shape[1]:
+            turned = space[3:6] @ free
+            sizes = turned.T @ turned + RANK * np.eye(free.shape[1])  # of what only shifts the object nothing is asked
+            alone = float(eigh(free.T @ needed @ free, sizes, eigvals_only=True)[-1])
         stiffness, way = _least(moved, needed, springy)
         levers = self._levers(k)
         tips, _ = _least(np.sqrt(levers)[:, None] * moved, needed, springy)

@@ -9,12 +9,10 @@ it off its place: there a soft support holds it while the hand takes it, and the
 
 Why this is fair to a real hand, as ``scene.xml`` has it:
 
-- *Motors* deflect by 50 mrad under the load that the finger may have to hold, and are critically damped: hobby
-  servos and tendon drives are about that stiff. The hand carries its own weight, as a controller that knows its
-  hand does.
-- *Contacts* are soft (a fingertip gives by a share of the object's size), with Coulomb friction of the task's
-  coefficient and the small torsional friction of a patch of 0.3 of the fingertip's radius. The plan counts on neither
-  softness nor torsion: rubber gives both for nothing, and without them a point contact spins freely.
+- *Motors* are springs about their set points, as stiff as the task says, and critically damped. The hand carries its
+  own weight, as a controller that knows its hand does.
+- *Contacts* are soft (a fingertip gives by a share of the object's size), with the task's Coulomb and torsional
+  friction. The plan counts on the torsion as the audit says, and not on the softness.
 - *Nothing is fed back* from the object, so an error made is never corrected: a real controller can only do better.
 """
 
