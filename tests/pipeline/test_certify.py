@@ -266,6 +266,9 @@ class Ways:
         assert (homotopy, margin, larger) == (0.5, AMPLE, LARGE)
         return self.taken("continue_from", larger if self.firm else margin)
 
+    def sharpened(self, exact: Any, margin: Margin) -> Any:
+        return self.taken("sharpened", margin)
+
     def with_margin(self, exact: Any, margin: Margin) -> Any:
         return self.taken("with_margin", margin)
 
@@ -281,6 +284,7 @@ def refine(
     drops: list[int],
     stiffness: float = 0.1,
     angle: float = 1.0,
+    soft: bool = False,
 ) -> tuple[Margin, int]:
     """The margin of what is kept and its drops, where designs and drops are judged as told, in this order.
 
@@ -306,7 +310,7 @@ def refine(
     monkeypatch.setattr(Refiner, "_replayed", played)
     whole: Any = SimpleNamespace(contacts=(0, 1), fingers=(), active=None)
     record, unused = Record(ball_task(), None, lambda _: None), SimpleNamespace()
-    refiner = Refiner(record, unused, unused, 1)  # type: ignore[arg-type]
+    refiner = Refiner(record, SimpleNamespace(torsion=float(soft)), unused, 1)  # type: ignore[arg-type]
     design, refined = refiner.certify(whole, (), homotopy=homotopy)
     assert (next(judged, None), next(dropped, None)) == (None, None)
     return refined.margin, design.drops or 0
@@ -339,6 +343,10 @@ def test_another_grip_is_tried_where_the_replay_as_planned_ends_off_its_goals(mo
     ways = Ways(firm=False)
     refine(monkeypatch, ways, 1.0, ["certified"] * 2, [0, 0], angle=4.0)
     assert ways.asked == [("solve", AMPLE), ("with_margin", LARGE)]
+    # Soft fingertips first resist slow spins in full.
+    ways = Ways(firm=False)
+    refine(monkeypatch, ways, 1.0, ["certified"] * 3, [0, 0, 0], angle=4.0, soft=True)
+    assert ways.asked == [("solve", AMPLE), ("sharpened", AMPLE), ("with_margin", LARGE)]
 
 
 def test_a_long_way_is_gone_with_a_firm_grip_at_once_where_it_can_be(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,7 +20,7 @@ from casadi_hands.problem.si import build_model, hand_of, joint_loads
 from casadi_hands.stages.refine import torsion
 from casadi_hands.stages.refine.continuation import Continuation
 from casadi_hands.stages.refine.result import Refined
-from casadi_hands.stages.refine.settings import SPIN_SCALE
+from casadi_hands.stages.refine.settings import SHARP
 from casadi_hands.stages.refine.stage import RefineStage
 from casadi_hands.stages.refine.values import Margin
 from casadi_hands.task import Task, parse_task
@@ -202,7 +202,8 @@ def let_down(tmp_path_factory: pytest.TempPathFactory) -> LetDown:
     task = parse_task(HANGING)
     model = build_model(task)
     whole = warm_start(hanging(task, model.schedule.samples), task, model)
-    refined = Continuation(model, whole.contacts, (2, 2), whole.active).solve(whole, Margin(), near=True)
+    continuation = Continuation(model, whole.contacts, (2, 2), whole.active)
+    refined = continuation.sharpened(continuation.solve(whole, Margin(), near=True), Margin())
     built = hand_of(task, model, refined.hand.fingers, refined.hand.contacts, *joint_loads(model, refined.hand))
     design = Design(task, "feasible", hand=built, motion=whole_hand_motion(model, refined.hand))
     folder = tmp_path_factory.mktemp("let_down")
@@ -230,7 +231,7 @@ def test_where_contacts_spin_their_moments_are_at_the_limit_against_the_spin(let
     # It turns about -x: against the right contact's outward normal, and about the left one's.
     for side, c in ((-1.0, 0), (1.0, 1)):
         rates = spin_rates(let_down.folder, build_trajectory(let_down.folder, shoot(let_down.folder)), c)
-        share = rates / np.hypot(rates, SPIN_SCALE["hard constraints"])
+        share = rates / np.hypot(rates, SHARP)
         quick = np.abs(rates) > 0.4
         assert np.sum(quick) >= 6
         assert np.all(-side * rates[quick] > 0.0)
@@ -255,7 +256,7 @@ def test_hard_points_have_the_same_problem_as_ever() -> None:
             build_model(parse_task(everything_text() + f"fingertip: {{torsion: {radius}}}\n")) for radius in (0.001, 0)
         )
     )
-    more = {"torsion", "twist_torque", "spin"}
+    more = {"torsion", "twist_torque", "spin", "holding"}
     assert set(soft.variables.names()) - set(hard.variables.names()) == more
     assert set(hard.variables.names()) <= set(soft.variables.names())
     rows = {name.partition(".")[2] for name in set(soft.constraint_rows) - set(hard.constraint_rows)}
