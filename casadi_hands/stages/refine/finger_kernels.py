@@ -181,7 +181,7 @@ def _structural(touch: Touch, force: SX) -> SX:
 
 
 @cache
-def rolling(joints: int, kind: type[Body], soft: bool, slides: bool = False) -> Kernel:
+def rolling(joints: int, kind: type[Body], soft: bool = False, slides: bool = False) -> Kernel:
     """One contact from one knot to the next: no slip, or as a variable; its spin costs, of soft tips as one, too."""
     kernel = Kernel("rolling")
     symbols = free_morphology(kernel, joints)
