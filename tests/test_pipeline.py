@@ -154,8 +154,8 @@ def farthest_contact(text: str, contact: int) -> float:
     [
         # Two links of 2 cm do not span 9 cm.
         (["hand: {link_length: [0.016, 0.02]}"], 0.02, ("goal 1 (0 s)", "goal 2 (0.6 s)")),
-        # A second goal 40 cm from the palm for fingers of 10 cm.
-        (["hand: {link_length: [0.016, 0.05]}", "[0, 0.015, 0.09] -> [0, 0.4, 0.09]"], 0.05, ("goal 2 (0.6 s)",)),
+        # A second goal 19 cm from the palm for fingers of 10 cm.
+        (["hand: {link_length: [0.016, 0.05]}", "[0, 0.015, 0.09] -> [0, 0.17, 0.09]"], 0.05, ("goal 2 (0.6 s)",)),
     ],
 )
 def test_a_contact_out_of_reach_fails_the_task(
