@@ -158,7 +158,7 @@ def smallest() -> str:
 def test_task_of_the_readme_loads() -> None:
     task = parse_task(smallest())
     assert task.object.characteristic_length == pytest.approx(0.06)
-    assert tuple(task.fingers) == ("left", "right")
+    assert tuple(task.fingers) == ("thumb", "index", "middle")
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if page != README and blocks(page, "yaml")], ids=named)
@@ -197,7 +197,7 @@ def test_python_of_the_readme_gives_a_certified_hand(solved: tuple[Path, str]) -
     lines = printed.splitlines()
     design = Design.load(folder / "results/mine")
     assert lines[0].split() == ["certified"]
-    assert [line.split()[0] for line in lines[1:-2]] == ["left", "right"]
+    assert [line.split()[0] for line in lines[1:-2]] == ["thumb", "index", "middle"]
     assert lines[-2] == "[]"
     assert float(lines[-1]) == pytest.approx(design.replays[0]["mean"]["mm"] / 1e3, rel=1e-6)
 
