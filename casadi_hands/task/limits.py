@@ -30,11 +30,13 @@ class Limits(Section):
         default=0.0, description="Normal force by which a contact would have to suck, over weight."
     )
     torsion_excess: NonNegative = Field(
-        default=0.01,
+        default=1e-3,
         description="Torsional moment beyond what a fingertip bears beside its force: over its radius, over weight.",
     )
     torsion_shortfall: NonNegative = Field(
-        default=0.15, description="Share by which the moment of a contact that spins is off its limit against the spin."
+        default=0.15,
+        description="Share by which the moment of a contact that spins is off its limit against the spin, or with "
+        "which it drives a slower one.",
     )
     penetration: NonNegative = Field(default=0.0001, description="Depth by which two bodies overlap, m.")
     gap: NonNegative = Field(default=0.00005, description="Distance of an active contact's surfaces at samples, m.")

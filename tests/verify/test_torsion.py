@@ -116,6 +116,15 @@ def test_where_a_contact_spins_its_moment_is_at_the_limit_against_the_spin(
     assert found["torsion_excess"].holds
 
 
+@pytest.mark.parametrize("share", [-0.8, -0.1, 0.1, 0.3])
+def test_a_moment_does_not_drive_a_slow_spin(tmp_path: Path, share: float) -> None:
+    moment = share * TORSION * PRESS
+    found = figures(pressed(tmp_path, (-moment, moment), 0.4))["torsion_shortfall"]
+    assert found.value == pytest.approx(max(share, 0.0), abs=1e-9)
+    assert found.holds == (share < 0.15)
+    assert ("drives its spin" in found.text) == (share > 0.0)
+
+
 def test_where_it_hardly_spins_nothing_is_asked(tmp_path: Path) -> None:
     for turn in (0.0, 0.15):
         assert figures(pressed(tmp_path / str(turn), (0.0, 0.0), turn))["torsion_shortfall"].value == 0.0

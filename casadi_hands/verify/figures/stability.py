@@ -22,6 +22,7 @@ from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.verify.figures.closest import closest_to_capsule, level_directions, lowest_points
+from casadi_hands.verify.figures.torsion import most_torsion, tip_radius
 from casadi_hands.verify.reading.folder import Folder
 
 STEP = 2e-3
@@ -168,10 +169,8 @@ class Stability:
         grasp, spins, stiff = [], [], []
         for c in active:
             point, normal = (values[k] for values in self.first[c])
-            own = self.moves[c]
-            moved = (jacobian[:3] - pin.skew(point) @ jacobian[3:]) * own
-            grasp.append(np.hstack([np.eye(3), -pin.skew(point - self.position[k]), -moved]))
-            spins.append(np.concatenate([np.zeros(3), normal, -(normal @ jacobian[3:]) * own]))
+            grasp.append(np.hstack([np.eye(3), -pin.skew(point - self.position[k]), -self._moved(k, int(c))]))
+            spins.append(np.concatenate([np.zeros(3), normal, -(normal @ jacobian[3:]) * self.moves[c]]))
             stiff.append(self._left(k, int(c)) / TWIST)
             if motion.contact_link[c] == "ground":
                 shape = self.folder.object.nearest(motion.contact_point_object[k, c])
@@ -179,15 +178,17 @@ class Stability:
                 grasp.append(np.hstack([np.zeros_like(tips), tips, np.zeros((len(tips), jacobian.shape[1]))]))
         return np.vstack(grasp), np.array(spins), np.array(stiff)
 
+    def _moved(self, k: int, c: int) -> np.ndarray:
+        """Return the Jacobian (3, J) of a contact's point at a sample, as a point of the link."""
+        jacobian = self.planned.jacobian[k]
+        moved: np.ndarray = (jacobian[:3] - pin.skew(self.first[c][0][k]) @ jacobian[3:]) * self.moves[c]
+        return moved
+
     def _left(self, k: int, c: int) -> float:
         """Return what is left of a contact's torsional friction, N·m."""
-        if self.folder.motion.contact_link[c] == "ground":
-            return 0.0
-        normal, force = self.first[c][1][k], self.forces[k, c]
-        pressing = max(-float(force @ normal), 0.0)
-        across = float(np.linalg.norm(force - (force @ normal) * normal)) / self.folder.friction(c)
-        most = self.folder.task.fingertip.torsion * np.sqrt(max(pressing**2 - across**2, 0.0))
-        return max(float(most) - abs(float(self.moments[k, c] @ normal)), 0.0)
+        normal = self.first[c][1][k]
+        most = tip_radius(self.folder, c) * most_torsion(self.forces[k, c], normal, self.folder.friction(c))
+        return max(most - abs(float(self.moments[k, c] @ normal)), 0.0)
 
     def modes(self) -> list[Mode]:
         """Return what the grasp needs at every sample."""
@@ -241,10 +242,9 @@ class Stability:
 
     def _levers(self, k: int) -> np.ndarray:
         """Return the square (J,), m², of each joint's lever at its finger's contact; of others' that of the longest."""
-        jacobian, levers = self.planned.jacobian[k], np.zeros(self.planned.jacobian.shape[2])
+        levers = np.zeros(self.planned.jacobian.shape[2])
         for c in np.flatnonzero(self.folder.motion.contact_active[k]):
-            moved = jacobian[:3] - pin.skew(self.first[c][0][k]) @ jacobian[3:]
-            levers = np.maximum(levers, self.moves[c] * np.sum(moved**2, axis=0))
+            levers = np.maximum(levers, np.sum(self._moved(k, int(c)) ** 2, axis=0))
         return np.where(levers > 0.0, levers, max(float(levers.max(initial=0.0)), 1e-12))
 
 
