@@ -34,13 +34,16 @@ def closest_to_capsule(
     def distance(share: np.ndarray) -> np.ndarray:
         return shape.distance(start + share[:, None] * along)
 
-    first, second = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+    first, second = np.full(len(start), 1.0 - _GOLDEN), np.full(len(start), _GOLDEN)
     near, far = distance(first), distance(second)
     for _ in range(_ROUNDS):
         left = near < far
-        high, low = np.where(left, second, high), np.where(left, low, first)
-        first, second = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-        near, far = distance(first), distance(second)
+        low, high = np.where(left, low, first), np.where(left, second, high)
+        # One of the two stays where it is: only the other is measured.
+        fresh = np.where(left, high - _GOLDEN * (high - low), low + _GOLDEN * (high - low))
+        measured = distance(fresh)
+        first, second = np.where(left, fresh, second), np.where(left, first, fresh)
+        near, far = np.where(left, measured, far), np.where(left, near, measured)
     axis = start + (0.5 * (low + high))[:, None] * along
     normal = shape.normal(axis)
     gap = shape.distance(axis) + radius
