@@ -79,6 +79,11 @@ class Structure:
         """Whether the ground ever carries load."""
         return bool(self.active.shape[1] > len(self.contacts))
 
+    @property
+    def pinched(self) -> bool:
+        """Whether two contacts ever hold the object alone: torsion alone then resists a turn about the line of both."""
+        return bool(self.active.sum(axis=1).min() < 3)
+
     @cached_property
     def middles(self) -> Inner:
         """The middle of each interval."""

@@ -185,16 +185,11 @@ def torsion_limit(pressing: SX, across: SX, friction: SX, rounding: float = 1e-6
     return ca.sqrt((left + ca.sqrt(left**2 + rounding**2)) / 2)
 
 
-def sliding(slip: SX, scale: SX) -> SX:
-    """Which way a contact slides (2,): 0 where it rests, a unit vector where it is far quicker than the scale.
+def saturated(rate: SX, scale: SX) -> SX:
+    """Which way a contact slides or spins: its rate over its size where it is quick, and 0 where it rests.
 
     Args:
-        slip: (2,) lengths/s.
-        scale: lengths/s.
+        rate: (n,) of slip or spin.
+        scale: what is quick, in the same unit.
     """
-    return slip / ca.sqrt(ca.sumsqr(slip) + scale**2)
-
-
-def spinning(spin: SX, scale: SX) -> SX:
-    """How much a contact spins, from -1 to 1: 0 where it rests, ±1 where it is far quicker than the scale, rad/s."""
-    return spin / ca.sqrt(spin**2 + scale**2)
+    return rate / ca.sqrt(ca.sumsqr(rate) + scale**2)

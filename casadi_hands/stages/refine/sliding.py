@@ -52,7 +52,7 @@ def law(kind: type[Body]) -> Kernel:
         first, second = tangents(normal, helper)
         across += ca.vertcat(ca.dot(first, force), ca.dot(second, force)) / 2
         pressing -= ca.dot(force, normal) / 2
-    way = contact_terms.sliding(slip, kernel.parameter("slip_scale"))
+    way = contact_terms.saturated(slip, kernel.parameter("slip_scale"))
     used = way + (1 - ca.sumsqr(way)) * sticking
     kernel.constrain(limits.SLIDING_LAW, across / friction - pressing * used)
     kernel.constrain(limits.STICKING, margin**2 - ca.sumsqr(sticking))

@@ -178,11 +178,8 @@ class RefineStage:
         return {f"weight.{term}": weights[term] / self.given.knots for term in self.problem.terms}
 
     def _spin_scale(self, what: str, sharp: bool) -> dict[str, ArrayLike]:
-        """Where two contacts hold the object it is torsion alone that keeps it from turning about the line of both."""
-        if not self.model.torsion:
-            return {}
-        pinched = bool(self.structure.active.sum(axis=1).min() < 3)
-        return {"spin_scale": SHARP if what == "hard constraints" and (sharp or pinched) else SPIN_SCALE[what]}
+        sharp = what == "hard constraints" and (sharp or self.structure.pinched)
+        return {"spin_scale": SHARP if sharp else SPIN_SCALE[what]} if self.model.torsion else {}
 
     def _slip_scale(self, times: float) -> dict[str, ArrayLike]:
         return {"slip_scale": times * SLIP_SCALE / self.model.units.length} if self.model.sliding else {}

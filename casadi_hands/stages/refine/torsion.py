@@ -77,7 +77,7 @@ def law(kind: type[Body]) -> Kernel:
     torsions = [kernel.variable(f"torsion{i}", 1, "torsion", i) for i in range(2)]
     spin, body = kernel.variable("spin", 1), kernel.parameter("body", kind.width)
     friction, holding = kernel.parameter("sliding_friction"), kernel.variable("holding", 1)
-    fully = contact_terms.spinning(spin, kernel.parameter("spin_scale"))
+    fully = contact_terms.saturated(spin, kernel.parameter("spin_scale"))
     most = sum(_limit(f, p, body, kind, friction) for f, p in zip(forces, points, strict=True)) / 2
     mean = (torsions[0] + torsions[1]) / 2
     kernel.constrain(limits.TORSION_LAW, mean + most * (fully - (1 - fully**2) * holding))
@@ -103,7 +103,7 @@ def bind(of: Declaration) -> None:
         body=[problem[f"body{c}"] for c in structure.contacts],
     )
     for i, c in enumerate(structure.contacts):
-        (point, force, torsion), shared = own[i], problem.given("sliding_friction")
+        point, force, torsion = own[i]
         active, start = np.flatnonzero(structure.active[:, i]), np.flatnonzero(structure.active[:-1, i])
         of.bind(
             active,
@@ -114,7 +114,7 @@ def bind(of: Declaration) -> None:
             force=force.take(active),
             point=point.take(active),
             torsion=torsion.take(active),
-            **shared,
+            **problem.given("sliding_friction"),
             **of.of(c, active, "body"),
         )
         of.bind(
@@ -128,8 +128,7 @@ def bind(of: Declaration) -> None:
                 for name, rows in (("force", force), ("point", point), ("torsion", torsion))
             },
             spin=of.spin.take(start).entries(i, i + 1, c),
-            **shared,
             holding=of.holding.take(start).entries(i, i + 1, c),
-            **problem.given("spin_scale"),
+            **problem.given("sliding_friction", "spin_scale"),
             **of.of(c, start, "body"),
         )

@@ -18,7 +18,7 @@ from casadi_hands.stages.own_terms import own_values
 from casadi_hands.stages.refine.declaration import HOLDING
 from casadi_hands.stages.refine.initial_guess import balanced, disturbance_wrenches, rates_and_wrenches
 from casadi_hands.stages.refine.problem import RefineProblem
-from casadi_hands.stages.refine.settings import SPIN_SCALE
+from casadi_hands.stages.refine.settings import SHARP, SPIN_SCALE
 from casadi_hands.stages.refine.sliding import SLIP_SCALE, WHOLE, runs
 from casadi_hands.stages.refine.sliding import start as sliding_start
 
@@ -175,6 +175,11 @@ class RefineValues:
             values[f"axes{c}"] = finger.axes.reshape(1, -1)
         return values
 
+    @property
+    def _spin_scale(self) -> float:
+        """Rate of spin, rad/s, of the last solve."""
+        return SHARP if self.structure.pinched else SPIN_SCALE["hard constraints"]
+
     def _torsion(self, motion: WholeHand, forces: Array) -> dict[str, Array]:
         """Values of what fingertips' torsion is made of, beside contact forces (S, C, 3)."""
         model, contacts = self.model, list(self.structure.contacts)
@@ -188,7 +193,7 @@ class RefineValues:
         across = np.sum(forces[:, :count] ** 2, axis=2) - pressing**2
         most = np.sqrt(np.maximum(pressing**2 - across / model.friction**2, 1e-6))
         share = ((torsion / most)[1:] + (torsion / most)[:-1]) / 2
-        fully = spins / np.sqrt(spins**2 + SPIN_SCALE["hard constraints"] ** 2)
+        fully = spins / np.sqrt(spins**2 + self._spin_scale**2)
         holding = np.clip((share + fully) / (1 - fully**2), -HOLDING, HOLDING)
         twist = model.torsion * np.einsum("sf,fsi->si", torsion, normals)
         return {"spin": spins, "torsion": torsion, "holding": holding, "twist_torque": twist}
@@ -218,8 +223,8 @@ class RefineValues:
         }
         values |= self.proximity.idle
         if model.torsion:
-            values |= {"torsion_radius": model.torsion}
-            values |= {"sliding_friction": model.friction, "spin_scale": SPIN_SCALE["hard constraints"]}
+            values |= {"torsion_radius": model.torsion, "sliding_friction": model.friction}
+            values["spin_scale"] = self._spin_scale
         if model.sliding:
             values |= {"sliding_friction": model.friction, "cone_friction": WHOLE * model.friction}
             values |= {"slide_margin": margin.friction, "slip_scale": SLIP_SCALE / model.units.length}
