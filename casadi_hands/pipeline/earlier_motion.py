@@ -9,6 +9,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from casadi_hands.geometry.contact_points import rounded_normals
 from casadi_hands.motion import linear, nearest_exponential, zero_order_hold
 from casadi_hands.motion.quaternion import quaternion
 from casadi_hands.nlp import Solution
@@ -63,7 +64,7 @@ def _torsion(motion: Motion, turns: Array, old: Model, model: Model, between: Ar
         return None
     moments = np.einsum("sji,scj->sci", turns, in_columns(motion, model, motion.contact_moment))
     points = in_columns(motion, model, motion.contact_point_object)
-    normals = np.array([[body.outward(p) for body, p in zip(model.touched, row, strict=True)] for row in points])
+    normals = np.stack([rounded_normals(points[:, c], body) for c, body in enumerate(model.touched)], axis=1)
     radius = model.torsion * model.units.length * old.units.force
     return np.asarray(between @ np.einsum("sci,sci->sc", moments, normals) / radius)
 

@@ -17,11 +17,11 @@ from casadi_hands.problem.placement import forces_of_joint_errors
 from casadi_hands.stages.refine.values import Margin
 
 SENSOR = np.deg2rad(0.75)  # error of a joint's sensor that must not take a finger off the object
-WEAKEST, AMPLE = 0.3, 1.5  # weights, of lower bounds on the normal force to begin with
-FIRMEST = 6.0  # weights, where replays drop the object
-FIRMER = 2.0  # times that
-SURER = 0.4  # share of the friction that may be used, where errors are to take less of it
-SPARING = 0.65  # share of it, where the grip is to ask for less stiffness
+WEAKEST, AMPLE = 0.3, 1.5  # weights: the lower bound on the normal force to begin with is between these
+FIRMEST = 6.0  # weights, that it may be where replays drop the object
+FIRMER = 2.0  # times the one to begin with, that it is then at least
+SURER = 0.4  # share of the friction that may be used then
+SPARING = 0.65  # share of the friction that may be used where the grip is to ask for less stiffness
 SMALL = Margin(friction=0.8, normal_force=0.25)
 
 
@@ -50,4 +50,4 @@ def margins_for(model: Model, whole: WholeHand) -> Margins:
     asked = round(min(max(*changes, WEAKEST), FIRMEST), 2)
     ample = Margin(normal_force=min(asked, AMPLE))
     larger = replace(ample, friction=SURER, normal_force=max(asked, FIRMER * ample.normal_force))
-    return Margins(ample, larger, Margin(friction=SPARING, normal_force=min(ample.normal_force, WEAKEST)))
+    return Margins(ample, larger, Margin(friction=SPARING, normal_force=WEAKEST))

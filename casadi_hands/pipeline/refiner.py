@@ -58,8 +58,9 @@ class Refiner:
     ) -> tuple[Design, Refined]:
         """Refine one hand with a margin, and with others where that fails.
 
-        A small one where no motion is exact, another lower bound on normal forces where the audit refuses one that is,
-        and a larger one where replays drop the object or miss their limits.
+        A small one where no motion is exact, and another lower bound on normal forces where the audit refuses one that
+        is. Where replays drop the object or end off its goals, a firmer grip or, where the joints are hardly stiff
+        enough, a softer one.
 
         Args:
             whole: the hand and its motion.
@@ -74,8 +75,7 @@ class Refiner:
         planned, margins = self.record.design, margins_for(self.model, whole)
         margin, largest = margin or margins.ample, margins.larger
         stage = Continuation(self.model, whole.contacts, tuple(f.joints for f in whole.fingers), whole.active)
-        larger = largest if homotopy < 1 else None
-        refined = self._refined(stage, whole, margin, near, homotopy, larger)
+        refined = self._refined(stage, whole, margin, near, homotopy, largest)
         judged, refined, stage = self._between(whole, refined, stage, short, planned)
         if refined.exact and judged.status != "certified" and not stage.passes_through(refined):
             # Where joints barely push, fingers may fold over in an instant: other forces take them another way.
@@ -141,7 +141,7 @@ class Refiner:
         margin: Margin,
         near: bool,
         homotopy: float,
-        larger: Margin | None,
+        larger: Margin,
     ) -> Refined:
         """The refinement with this margin or, where that is not exact and another may be, with a small one.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -77,5 +78,11 @@ class Result:
         if not first["dropped_as_planned"]:
             planned = f"{first['mean']['mm']:.2g} mm and {first['mean']['degrees']:.2g}° off plan on average"
         dropping = [name for name, each in first.get("perturbed", {}).items() if each["dropped"]]
-        which = f" ({', '.join([*dropping[:3], *(['…'] if len(dropping) > 3 else [])])})" if dropping else ""
-        return f"in MuJoCo {planned}, {first['dropped']} of {first['of']} perturbed replays drop it{which}"
+        return (
+            f"in MuJoCo {planned}, {first['dropped']} of {first['of']} perturbed replays drop it{first_few(dropping)}"
+        )
+
+
+def first_few(names: Sequence[str], most: int = 3) -> str:
+    """Names in brackets after a space, no more than so many of them; nothing of none."""
+    return f" ({', '.join([*names[:most], *(['…'] if len(names) > most else [])])})" if names else ""

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from casadi_hands.problem.result import first_few
 from casadi_hands.task import Task
 from casadi_hands.verify.replays.perturb import Perturbation, suite
 from casadi_hands.verify.replays.replay import Player, Replay, can_play, replay_each
@@ -18,9 +19,6 @@ from casadi_hands.verify.report import Figure
 
 TOGETHER = 4
 """Replays of a design with everything perturbed at once, beside those with one thing at a time."""
-
-NAMED = 3
-"""Replays that a figure names, at most."""
 
 ENOUGH_STEPS = 100_000
 """Steps of a simulation that are worth starting processes for."""
@@ -88,8 +86,7 @@ class Replays:
     def _dropped(self, engine: str, limit: float) -> Figure:
         if self.nominal.dropped:
             return Figure("replay_dropped", 1.0, limit, "share", f"in {engine} the object is dropped as planned")
-        which = ", ".join([*self.dropping[:NAMED], *(["…"] if self.drops > NAMED else [])])
-        which = f" ({which})" if which else ""
+        which = first_few(self.dropping)
         found = f"in {engine} {self.drops} of {len(self.perturbed)} perturbed replays drop the object{which}, {{value}}"
         return Figure("replay_dropped", self.drops / len(self.perturbed), limit, "share", found)
 
