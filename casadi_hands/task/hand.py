@@ -9,8 +9,8 @@ from casadi_hands.task.fields import NonNegative, Number, Pair, Positive, Sectio
 USUAL_STIFFNESS = 1.0
 """N·m/rad. An 18 g servo (Dynamixel XL330-M288, by its maker's manual) gives its stall torque, 0.52 N·m, where the
 error times its gain, 400/128 a pulse of 1/4096 turn as delivered, reaches the most it gives, 885: at 0.43 rad, so
-1.2 N·m/rad, and more with its gain turned up. A printed finger of 5 mm radius and 50 mm length (PLA, 2.5 GPa) bends like
-a spring of 74 N·m/rad at its root, and takes next to nothing off that."""
+1.2 N·m/rad, and more with its gain turned up. A printed finger of 5 mm radius and 50 mm length (2.5 GPa) bends like a
+spring of 74 N·m/rad at its root, and takes next to nothing off that."""
 
 
 class FingerSpec(Section):
