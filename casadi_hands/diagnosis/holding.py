@@ -199,6 +199,7 @@ def _jacobian(design: Result, finger: int, sample: int, contact: int) -> Array:
     axes, lengths = np.array([link.axis for link in links]).T, [link.length for link in links]
     *_, jacobian = finger_kinematics(len(links))(
         ca.DM(hand.fingers[finger].base),
+        np.hstack([link.turn.as_matrix() for link in links]),
         axes,
         lengths,
         motion.joint_angles[sample, columns],

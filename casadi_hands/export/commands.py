@@ -67,6 +67,7 @@ def joint_torques(hand: Hand, motion: Motion) -> np.ndarray:
         turned, origin = Rotation.identity(len(motion.time)), np.tile(np.asarray(finger.base), (len(motion.time), 1))
         origins, axes = [], []
         for j, link in enumerate(finger.links):
+            turned = turned * link.turn
             axes.append(turned.apply(link.axis))
             origins.append(origin)
             turned = turned * Rotation.from_rotvec(motion.joint_angles[:, [columns[j]]] * np.asarray(link.axis))

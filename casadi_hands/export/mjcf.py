@@ -208,7 +208,7 @@ def _add_finger(
     for j, (link, (motor, angle)) in enumerate(zip(finger.links, joints, strict=True)):
         name = f"finger{i}_link{j}"
         # A turn about its own axis leaves the axis where it is, so that it is the URDF's.
-        turn = Rotation.from_rotvec(angle * np.asarray(link.axis)).as_quat(scalar_first=True)
+        turn = (link.turn * Rotation.from_rotvec(angle * np.asarray(link.axis))).as_quat(scalar_first=True)
         body = SubElement(parent, "body", name=name, pos=numbers(origin), quat=numbers(turn), gravcomp="1")
         SubElement(
             body,

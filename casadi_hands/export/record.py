@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from math import isfinite
@@ -87,7 +88,7 @@ def hand_from_record(record: dict[str, Any]) -> Hand | None:
                     name=str(finger["name"]),
                     base=_vector(finger["base"]),
                     links=tuple(
-                        Link(float(link["length"]), float(link["radius"]), _vector(link["axis"]))
+                        Link(float(link["length"]), float(link["radius"]), _vector(link["axis"]), _bend(link))
                         for link in finger["links"]
                     ),
                 )
@@ -111,7 +112,10 @@ def _hand(hand: Hand) -> dict[str, Any]:
             {
                 "name": finger.name,
                 "base": finger.base,
-                "links": [{"length": link.length, "radius": link.radius, "axis": link.axis} for link in finger.links],
+                "links": [
+                    {"length": link.length, "radius": link.radius, "axis": link.axis, "bend": link.bend}
+                    for link in finger.links
+                ],
             }
             for finger in hand.fingers
         ],
@@ -140,6 +144,12 @@ def rotation_quaternion(vector: np.ndarray) -> np.ndarray:
     angle = float(np.linalg.norm(vector))
     # np.sinc(x) is sin(πx)/(πx), defined at 0.
     return np.array([np.cos(angle / 2), *(np.sinc(angle / (2 * np.pi)) / 2 * np.asarray(vector))])
+
+
+def _bend(link: Mapping[str, Any]) -> tuple[float, float]:
+    """A link's bend, rad; earlier folders tell none, and have none."""
+    x, y = (float(value) for value in link.get("bend", (0.0, 0.0)))
+    return x, y
 
 
 def _vector(values: Any) -> tuple[float, float, float]:

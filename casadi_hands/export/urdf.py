@@ -23,7 +23,7 @@ from casadi_hands.geometry.bodies import Solid
 from casadi_hands.problem.inertia import Inertial, link_inertial, palm_inertial
 
 if TYPE_CHECKING:
-    from casadi_hands.problem.hand import Finger, Hand
+    from casadi_hands.problem.hand import Finger, Hand, Link
     from casadi_hands.task import Task
 
 _UPRIGHT = 1e-12  # of a unit vector, what no direction can be read off
@@ -100,7 +100,7 @@ def _add_finger(robot: Element, hand: Hand, i: int, finger: Finger) -> None:
         joint = SubElement(robot, "joint", name=f"finger{i}_joint{j}", type="revolute")
         SubElement(joint, "parent", link=parent)
         SubElement(joint, "child", link=name)
-        SubElement(joint, "origin", xyz=numbers(origin), rpy="0 0 0")
+        SubElement(joint, "origin", xyz=numbers(origin), rpy=_bend(link))
         SubElement(joint, "axis", xyz=numbers(link.axis))
         SubElement(
             joint,
@@ -115,6 +115,11 @@ def _add_finger(robot: Element, hand: Hand, i: int, finger: Finger) -> None:
         solid = Solid("capsule", np.zeros(3), np.array([0.0, 0.0, link.length]), link.radius)
         _add_solid(body, solid, finger_color(i), joint_color(i))
         parent, origin = name, np.array([0.0, 0.0, link.length])
+
+
+def _bend(link: Link) -> str:
+    """URDF's angles of how a link is bent from the one before."""
+    return numbers(_roll_pitch_yaw(link.turn.as_matrix())) if any(link.bend) else "0 0 0"
 
 
 def _add_transmission(robot: Element, joint: str) -> None:

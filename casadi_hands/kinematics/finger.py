@@ -18,15 +18,16 @@ def finger_kinematics(joints: int) -> casadi.Function:
     """Build the kinematics of a serial finger with its morphology as symbols.
 
     Joint 0 sits at ``base``, joint j + 1 at ``(0, 0, lengths[j])`` in link j's frame, the tip at
-    ``(0, 0, lengths[-1])`` in the last. At zero angles every link frame is parallel to the palm's. Any unit of
-    length may go in, in place of the m below; the same comes out.
+    ``(0, 0, lengths[-1])`` in the last. At zero angle a link's frame is its parent's (the palm's for link 0), turned
+    by its own entry of ``turns``. Any unit of length may go in, in place of the m below; the same comes out.
 
     The function is an SX function named ``finger_kinematics_{joints}``; called with SX it expands in place.
 
     Inputs:
         base: (3,) origin of joint 0, palm frame, m.
-        axes: (3, n) unit axis of each joint, in its parent link's frame (the palm's for joint 0). They are not
-            normalised here: only for unit axes are the rotations rotations.
+        turns: (3, 3n) the rotation of each link's frame at zero angle side by side, parent <- link.
+        axes: (3, n) unit axis of each joint, in its link's frame. They are not normalised here: only for unit axes are
+            the rotations rotations.
         lengths: (n,) segment lengths, m.
         angles: (n,) joint angles, rad.
         point: (3,) contact point in the last link's frame, m.

@@ -42,6 +42,7 @@ def link_frames(finger: FingerSeed, link_radius: float, angles: Array) -> tuple[
 def _at(finger: FingerSeed, link_radius: float, angles: Array, on_link: Array) -> tuple[ca.DM, ...]:
     """What ``finger_kinematics`` gives, side by side, at angles (S, n) and points (3, S) of the last link."""
     count, joints = angles.shape
-    given = (np.append(finger.base, STAND * link_radius)[:, None], finger.axis_vectors.T, finger.lengths[:, None])
+    base, turns = np.append(finger.base, STAND * link_radius), np.hstack(list(finger.turns))
+    given = (base[:, None], turns, finger.axis_vectors.T, finger.lengths[:, None])
     inputs = [np.tile(each, count) for each in given]
     return tuple(finger_kinematics(joints).map(count)(*inputs, angles.T, on_link))

@@ -20,12 +20,14 @@ class FingerSymbols:
     Attributes:
         base: (2,) of the first joint, which stands ``STAND`` link radii above the palm's face.
         lengths: (n,).
-        axes: (3, n) unit joint axes, parent frames.
+        axes: (3, n) unit joint axes, frames of their links.
+        turns: (3, 3n) rotations of links at zero angle, parent <- link: their bends.
     """
 
     base: SX
     lengths: SX
     axes: SX
+    turns: SX
 
     @property
     def joints(self) -> int:
@@ -37,7 +39,7 @@ class FingerSymbols:
         function = finger_kinematics(self.joints)
         at = SX.zeros(3, 1) if point is None else point
         base = ca.vertcat(self.base, STAND * radius)
-        origins, rotations, tip, contact, jacobian = function(base, self.axes, self.lengths, angles, at)
+        origins, rotations, tip, contact, jacobian = function(base, self.turns, self.axes, self.lengths, angles, at)
         return PlacedFinger(origins, rotations, tip, contact, jacobian)
 
 
@@ -71,7 +73,7 @@ class Declare(Protocol):
 
 
 def morphology(declare: Declare, frames: SX, joints: int, place: int | None = None) -> FingerSymbols:
-    """Declare a finger's morphology (base 2, lengths n, axis coordinates 2n) with ``declare``.
+    """Declare a finger's morphology (base 2, lengths n, axis coordinates 2n, bends 2n) with ``declare``.
 
     Args:
         declare: a kernel's ``variable`` or ``parameter``.
@@ -83,8 +85,20 @@ def morphology(declare: Declare, frames: SX, joints: int, place: int | None = No
     base = declare(f"base{tag}", 2, "base", place)
     lengths = declare(f"lengths{tag}", joints, "lengths", place)
     coordinates = declare(f"axes{tag}", 2 * joints, "axes", place)
-    axes = [axis(coordinates[2 * j : 2 * j + 2], frames[9 * j : 9 * j + 9]) for j in range(joints)]
-    return FingerSymbols(base, lengths, ca.horzcat(*axes))
+    bends = declare(f"bends{tag}", 2 * joints, "bends", place)
+    return FingerSymbols(base, lengths, axes_of(coordinates, frames), turns_of(bends))
+
+
+def axes_of(coordinates: SX, frames: SX) -> SX:
+    """The unit axes (3, n) at coordinates (2n,) about seed frames (9n,)."""
+    return ca.horzcat(
+        *[axis(coordinates[2 * j : 2 * j + 2], frames[9 * j : 9 * j + 9]) for j in range(frames.numel() // 9)]
+    )
+
+
+def turns_of(bends: SX) -> SX:
+    """The rotations (3, 3n), parent <- link, of bends (2n,)."""
+    return ca.horzcat(*[bent(bends[2 * j : 2 * j + 2]) for j in range(bends.numel() // 2)])
 
 
 def axis(coordinates: SX, frame: SX) -> SX:
@@ -92,6 +106,22 @@ def axis(coordinates: SX, frame: SX) -> SX:
     rotation = ca.reshape(frame, 3, 3)
     angle = norm(coordinates, 1e-5)
     return ca.mtimes(rotation, ca.vertcat(ca.sin(angle) / angle * coordinates, ca.cos(angle)))
+
+
+def bent(bend: SX) -> SX:
+    """The rotation (3, 3), parent <- link, by a rotation vector (2,) across the parent's z axis, rad."""
+    x, y = bend[0], bend[1]
+    angle = norm(bend, 1e-5)
+    cross = SX.zeros(3, 3)
+    cross[0, 2], cross[1, 2], cross[2, 0], cross[2, 1] = y, -x, -y, x
+    half = ca.sin(angle / 2) / angle
+    return SX.eye(3) + ca.sin(angle) / angle * cross + 2 * half**2 * ca.mtimes(cross, cross)
+
+
+def cosines_from_links(axes: SX, turns: SX) -> SX:
+    """Cosines (2n - 1,) between joint axes (3, n) and the links beside them: each one's own, then the ones before."""
+    before = [ca.dot(axes[:, j], turns[2, 3 * j : 3 * j + 3].T) for j in range(1, axes.shape[1])]
+    return ca.vertcat(axes[2, :].T, *before)
 
 
 def tip_point(coordinates: SX, length: SX, radius: SX) -> tuple[SX, SX]:

@@ -204,7 +204,14 @@ def _reach(finger: FingerSeed, angles: Array, on_link: Array, away: Array) -> Ar
     for _ in range(_STEPS):
         *_, point, jacobian = (
             np.asarray(value)
-            for value in function(np.append(finger.base, 0), finger.axis_vectors.T, finger.lengths, turned, on_link)
+            for value in function(
+                np.append(finger.base, 0),
+                np.hstack(list(finger.turns)),
+                finger.axis_vectors.T,
+                finger.lengths,
+                turned,
+                on_link,
+            )
         )
         target = point.ravel() + away if target is None else target
         rows = np.vstack([jacobian, _STIFF * np.eye(finger.joints)])

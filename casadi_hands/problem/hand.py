@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    pass
+from scipy.spatial.transform import Rotation
 
 
 @dataclass(frozen=True)
@@ -16,13 +14,20 @@ class Link:
     Attributes:
         length: length of the capsule's axis, m.
         radius: radius of the capsule, m.
-        axis: (3,) unit vector of the joint at the segment's start, in the parent frame. At zero angle
-            every link frame is parallel to the palm's.
+        axis: (3,) unit vector of the joint at the segment's start, in the link's frame.
+        bend: (2,) how the link's frame is turned from its parent's, the palm's for the first, at zero angle: rotation
+            vector about the parent's x and y axes, rad.
     """
 
     length: float
     radius: float
     axis: tuple[float, float, float]
+    bend: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def turn(self) -> Rotation:
+        """From its parent's frame to its own at zero angle."""
+        return Rotation.from_rotvec([*self.bend, 0.0])
 
 
 @dataclass(frozen=True)

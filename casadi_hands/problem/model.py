@@ -58,6 +58,8 @@ class Model:
         tool: (3,) object frame, or None when goals are poses.
         scenarios: the motion as planned, and if the task disturbs it, the same with what does.
         link_radius: of all links.
+        bend: largest of a link at zero angle, rad.
+        axis_cosines: least and largest cosine of a joint's axis and the links beside it.
         link_length: shortest and longest link.
         joint_limits: lower and upper, rad.
         torque_limit: of a joint in m·g·length, or inf.
@@ -91,6 +93,8 @@ class Model:
     tool: Array | None
     scenarios: tuple[Scenario, ...]
     link_radius: float
+    bend: float
+    axis_cosines: tuple[float, float]
     link_length: tuple[float, float]
     joint_limits: tuple[float, float]
     torque_limit: float
@@ -185,6 +189,11 @@ class Model:
     def goal_poses(self) -> Array:
         """(G, 6) position and rotation vector from the reference at the goals, world."""
         return np.hstack([self.goal_positions, self.goal_vectors])
+
+    @property
+    def hinged(self) -> bool:
+        """Whether joints' axes may not stand as they like to the links beside them."""
+        return self.axis_cosines != (0.0, 1.0)
 
     @property
     def disturbance(self) -> Scenario | None:

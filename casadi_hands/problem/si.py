@@ -81,6 +81,8 @@ def build_model(task: Task) -> Model:
         link_radius=round_off(task.hand.link_radius / length),
         link_length=(round_off(task.hand.link_length[0] / length), round_off(task.hand.link_length[1] / length)),
         joint_limits=(math.radians(low), math.radians(high)),
+        bend=math.radians(task.hand.bend),
+        axis_cosines=_cosines(task.hand.axes.from_link),
         torque_limit=math.inf if actuator.torque is None else round_off(actuator.torque / units.torque),
         speed_limit=math.inf if actuator.speed is None else actuator.speed,
         stiffness=round_off(actuator.stiffness / units.torque),
@@ -90,6 +92,12 @@ def build_model(task: Task) -> Model:
         clearance=round_off(task.hand.clearance / length),
     )
     return model if given else replace(model, force_limit=usual_force_limit(model))
+
+
+def _cosines(degrees: tuple[float, float]) -> tuple[float, float]:
+    """Least and largest cosine of angles between least and largest ones."""
+    least, largest = (math.cos(math.radians(angle)) for angle in reversed(degrees))
+    return (least if degrees[1] < 90 else 0.0), largest
 
 
 def _sliding(slip: float, length: float) -> float:
@@ -158,8 +166,8 @@ def hand_of(
     built = []
     for finger, contact in zip(fingers, contacts, strict=True):
         links = tuple(
-            Link(float(part * length), model.link_radius * length, _triple(a / np.linalg.norm(a)))
-            for part, a in zip(finger.lengths, finger.axis_vectors, strict=True)
+            Link(float(part * length), model.link_radius * length, _triple(a / np.linalg.norm(a)), (b[0], b[1]))
+            for part, a, b in zip(finger.lengths, finger.axis_vectors, finger.bends.tolist(), strict=True)
         )
         base = _triple(np.append(finger.base, STAND * model.link_radius) * length)
         built.append(Finger(model.contact_names[contact], base, links))
@@ -177,7 +185,7 @@ def hand_of(
 
 
 def design_change(model: Model, before: WholeHand, after: WholeHand) -> dict[str, dict[str, float]]:
-    """For each finger how far its base moved and its lengths changed at most, m, and its axes turned, rad."""
+    """For each finger how far its base moved and its lengths changed at most, m, and its axes and bends, rad."""
     changes = {}
     for contact, old, new in zip(before.contacts, before.fingers, after.fingers, strict=True):
         cosines = np.clip((new.axis_vectors * old.axis_vectors).sum(axis=1), -1, 1)
@@ -185,6 +193,7 @@ def design_change(model: Model, before: WholeHand, after: WholeHand) -> dict[str
             "base": float(np.linalg.norm(new.base - old.base)) * model.units.length,
             "lengths": float(np.abs(new.lengths - old.lengths).max()) * model.units.length,
             "axes": float(np.arccos(cosines).max()),
+            "bends": float(np.linalg.norm(new.bends - old.bends, axis=1).max()),
         }
     return changes
 
@@ -201,6 +210,7 @@ def finger_from_si(finger: Finger, angles: Array, length: float) -> FingerSeed:
         lengths=np.array([link.length for link in finger.links]) / length,
         frames=np.array([frame_about(np.array(link.axis)) for link in finger.links]),
         axes=np.zeros((len(finger.links), 2)),
+        bends=np.array([link.bend for link in finger.links]),
         angles=angles,
         tips=np.zeros((0, 2)),
     )

@@ -34,6 +34,9 @@ _QUANTITIES = {
     "base": Quantity("where the finger stands on the palm", "length"),
     "lengths": Quantity("of the links", "length"),
     "axes": Quantity("of the joints: two exponential coordinates each, from the frames' third columns", "rad"),
+    "bends": Quantity(
+        "of the links at zero angle, from the link before: rotation vectors about its x and y axes", "rad"
+    ),
     "angles": Quantity("of the joints, one row a keyframe or knot", "rad"),
     "tips": Quantity("where on the fingertip's surface the contact is, for each time that it touches", "length"),
     # The object and what acts on it.
@@ -112,6 +115,7 @@ _QUANTITIES = {
     "wanted_base": Quantity("where costs hold the finger's base near to", "length"),
     "wanted_lengths": Quantity("the links' lengths that costs hold near to", "length"),
     "wanted_axes": Quantity("the joints' axes that costs hold near to", "rad"),
+    "wanted_bends": Quantity("the links' bends that costs hold near to", "rad"),
 }
 
 

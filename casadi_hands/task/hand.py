@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from pydantic import Field, field_validator
 
 from casadi_hands.task.fields import NonNegative, Number, Pair, Positive, Section, Vector, refuse
@@ -54,6 +56,23 @@ class Fingertip(Section):
     )
 
 
+class Axes(Section):
+    """How joints are turned in their links."""
+
+    from_link: Pair = Field(
+        default=(60.0, 90.0),
+        description="Smallest and largest angle between a joint's axis and the links beside it, degrees. Below some 60 "
+        "a joint twists its link more than it bends the finger, and its bearing bears what the motor should.",
+    )
+
+    @field_validator("from_link")
+    @classmethod
+    def _angles_in_order(cls, value: Pair) -> Pair:
+        if not 0 <= value[0] < value[1] <= 90:
+            raise refuse("[least, largest] in degrees with 0 <= least < largest <= 90")
+        return value
+
+
 class HandSpec(Section):
     """What fingers can be built."""
 
@@ -67,6 +86,12 @@ class HandSpec(Section):
         },
     )
     joint_limits: Pair = Field(default=(-90.0, 90.0), description="Lower and upper limit of every joint, degrees.")
+    bend: Annotated[NonNegative, Field(le=120)] = Field(
+        default=90.0,
+        description="Largest angle at zero angle between a link and the one before, the palm's normal for the first, "
+        "degrees. 0 gives links that are straight on from each other.",
+    )
+    axes: Axes = Field(default=Axes(), description="How joints are turned in their links.")
     density: Positive = Field(default=1150.0, description="Density of links and palm, kg/m³.")
     contact_force: Positive | None = Field(
         default=None,

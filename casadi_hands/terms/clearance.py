@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import casadi as ca
 from casadi import SX
 
 from casadi_hands.declared import Term, Weight
-from casadi_hands.geometry import penalty_spline, point_disc_distance, segment_distance
+from casadi_hands.geometry import norm, penalty_spline, point_disc_distance, segment_distance
 from casadi_hands.geometry.bodies import Surface
 from casadi_hands.geometry.bodies.capsule import Segment
 from casadi_hands.geometry.pairs import core_distance
 
 _ROUNDING = 1e-3  # half the width of the spline's transition, lengths
+HINGE = 2.0
+"""Link radii that a hinge takes of either link: beyond, neighbours are clear of each other."""
 
 COLLISION = Term(
     "collision",
@@ -70,6 +73,9 @@ def links_and_links(ends: list[tuple[SX, SX]], others: list[tuple[SX, SX]], radi
 
 
 def links_of_one(ends: list[tuple[SX, SX]], radius: SX) -> SX:
-    """Distances between links of one finger that are not neighbours."""
+    """Distances between links of one finger; of neighbours as balls on their axes, ``HINGE`` radii off their joint."""
     pairs = [(ends[i], ends[j]) for i in range(len(ends)) for j in range(i + 2, len(ends))]
-    return ca.vertcat(*[segment_distance(*a, *b) - 2 * radius for a, b in pairs]) if pairs else SX.zeros(0, 1)
+    along = [(end - start) / norm(end - start, _ROUNDING) for start, end in ends]
+    folds = [HINGE * radius * norm(a + b, _ROUNDING) for a, b in itertools.pairwise(along)]
+    axes = [segment_distance(*a, *b) for a, b in pairs]
+    return ca.vertcat(SX.zeros(0, 1), *axes, *folds) - 2 * radius

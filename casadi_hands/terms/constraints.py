@@ -46,6 +46,12 @@ ABOVE_GROUND = Constraint(
 )
 ON_PATH = Constraint("on_path", "fig. 3.4", "length", "draw its path", _PACE, ("goal_position",))
 
+# A finger's shape.
+AXIS_FROM_LINK = Constraint(
+    "from_link", "squared cosine of axis and link", "", "be built with hinges", "a wider range in hand.axes.from_link"
+)
+BENT = Constraint("bent", "squared angle of the bend", "rad²", "be bent no further", "a larger hand.bend")
+
 # A finger's contact.
 ON_OBJECT = Constraint(
     "on_object", "eq. 2.10 as an equation", "length", "stay on the object's surface", _REACH, (*_GAP, *_BALANCE, "slip")

@@ -23,6 +23,7 @@ TIP_TARGET = Term(
     weights={"synthesis": Weight((50.0, 10.0, 50.0))},
 )
 LENGTH = Term("length", "Length of links", "eq. 2.21", "length", weights={"synthesis": Weight(0.1, "once")})
+BEND = Term("bend", "Bends of links", "", "rad", weights={"synthesis": Weight(0.02, "once")})
 MINIMUM_LENGTH = Term(
     "minimum_length",
     "Links outside the allowed lengths",

@@ -66,7 +66,7 @@ def same(one: Synthesised, other: Synthesised) -> None:
     assert one.solution.objective == other.solution.objective
     assert one.solution.terms == other.solution.terms
     for a, b in zip(one.fingers, other.fingers, strict=True):
-        for name in ("base", "lengths", "axes", "angles", "tips", "frames"):
+        for name in ("base", "lengths", "axes", "bends", "angles", "tips", "frames"):
             np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
 
 

@@ -11,6 +11,7 @@ import casadi
 import numpy as np
 import pinocchio
 import pytest
+from scipy.spatial.transform import Rotation
 
 from casadi_hands.errors import KinematicsError
 from casadi_hands.kinematics import finger_kinematics
@@ -21,6 +22,7 @@ OUTPUTS = ("origins", "rotations", "tip", "contact", "jacobian")
 @dataclass(frozen=True)
 class Inputs:
     base: np.ndarray
+    turns: np.ndarray
     axes: np.ndarray
     lengths: np.ndarray
     angles: np.ndarray
@@ -36,6 +38,7 @@ def random_inputs(joints: int, seed: int) -> Inputs:
     axes = rng.normal(size=(3, joints))
     return Inputs(
         base=rng.uniform(-0.1, 0.1, 3),
+        turns=np.hstack(list(Rotation.random(joints, rng=rng).as_matrix())),
         axes=axes / np.linalg.norm(axes, axis=0),
         lengths=rng.uniform(0.01, 0.1, joints),
         angles=rng.uniform(-np.pi, np.pi, joints),
@@ -48,7 +51,7 @@ def numeric_pinocchio(inputs: Inputs) -> dict[str, np.ndarray]:
     model, joint = pinocchio.Model(), 0
     offsets = [inputs.base, *([0.0, 0.0, length] for length in inputs.lengths)]
     for j, axis in enumerate(inputs.axes.T):
-        placement = pinocchio.SE3(np.eye(3), np.array(offsets[j]))
+        placement = pinocchio.SE3(inputs.turns[:, 3 * j : 3 * j + 3], np.array(offsets[j]))
         joint = model.addJoint(joint, pinocchio.JointModelRevoluteUnaligned(axis), placement, f"j{j}")
     data = model.createData()
     pinocchio.computeJointJacobians(model, data, inputs.angles)
@@ -88,7 +91,7 @@ def test_jacobian_is_the_derivative_of_the_contact_point(joints: int) -> None:
 
 def test_zero_configuration_stands_straight_up_from_the_base() -> None:
     inputs = random_inputs(3, seed=1)
-    straight = Inputs(**{**vars(inputs), "angles": np.zeros(3)})
+    straight = Inputs(**{**vars(inputs), "angles": np.zeros(3), "turns": np.tile(np.eye(3), 3)})
     heights = np.concatenate([[0.0], np.cumsum(inputs.lengths)])
     values = straight.evaluate()
     up = np.outer([0.0, 0.0, 1.0], heights) + inputs.base[:, None]
@@ -98,7 +101,14 @@ def test_zero_configuration_stands_straight_up_from_the_base() -> None:
 
 
 def symbols(joints: int) -> dict[str, casadi.SX]:
-    shapes = {"base": (3, 1), "axes": (3, joints), "lengths": (joints, 1), "angles": (joints, 1), "point": (3, 1)}
+    shapes = {
+        "base": (3, 1),
+        "turns": (3, 3 * joints),
+        "axes": (3, joints),
+        "lengths": (joints, 1),
+        "angles": (joints, 1),
+        "point": (3, 1),
+    }
     return {name: casadi.SX.sym(name, *shape) for name, shape in shapes.items()}
 
 
@@ -115,21 +125,21 @@ def test_expands_inside_a_larger_symbolic_expression() -> None:
 
 
 def test_second_derivatives_at_zero_angles_match_the_double_cross_product() -> None:
-    # For one joint the contact point is base + R(q) p, so its second derivative at q = 0 is a × (a × p).
+    # For one joint the contact point is base + T R(q) p, so its second derivative at q = 0 is T (a × (a × p)).
     arguments = symbols(1)
     contact = finger_kinematics(1)(**arguments)["contact"]
     second = casadi.jacobian(casadi.jacobian(contact, arguments["angles"]), arguments["angles"])
     function = casadi.Function("second", {**arguments, "second": second}, list(arguments), ["second"])
     inputs = Inputs(**{**vars(random_inputs(1, seed=3)), "angles": np.zeros(1)})
     axis = inputs.axes[:, 0]
-    expected = np.cross(axis, np.cross(axis, inputs.point))
+    expected = inputs.turns @ np.cross(axis, np.cross(axis, inputs.point))
     np.testing.assert_allclose(np.array(function(**vars(inputs))["second"])[:, 0], expected, rtol=0, atol=1e-15)
 
 
 def test_inputs_outputs_and_name() -> None:
     function = finger_kinematics(3)
     assert function.name() == "finger_kinematics_3"
-    assert function.name_in() == ["base", "axes", "lengths", "angles", "point"]
+    assert function.name_in() == ["base", "turns", "axes", "lengths", "angles", "point"]
     assert function.name_out() == list(OUTPUTS)
     assert [function.size_out(i) for i in range(5)] == [(3, 3), (3, 9), (3, 1), (3, 1), (3, 3)]
     assert finger_kinematics(3) is function

@@ -31,6 +31,7 @@ def bending(elbow: Array) -> tuple[WholeHand, Array]:
         lengths=np.array([1.1, 1.3, 0.9])[:joints],
         frames=frames,
         axes=np.zeros((joints, 2)),
+        bends=np.zeros((joints, 2)),
         angles=angles[:1],
         tips=np.zeros((1, 2)),
     )

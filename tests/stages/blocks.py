@@ -105,13 +105,19 @@ def random_finger(joints: int, rng: np.random.Generator) -> FingerSeed:
         lengths=rng.uniform(0.9, 2.0, joints),
         frames=Rotation.random(joints, rng=rng).as_matrix(),
         axes=rng.uniform(-0.7, 0.7, (joints, 2)),
+        bends=rng.uniform(-0.4, 0.4, (joints, 2)),
         angles=rng.uniform(-0.8, 0.8, (1, joints)),
         tips=np.zeros((1, 2)),
     )
 
 
 def shape(finger: FingerSeed, tag: str = "") -> dict[str, object]:
-    return {f"base{tag}": finger.base, f"lengths{tag}": finger.lengths, f"axes{tag}": finger.axes}
+    return {
+        f"base{tag}": finger.base,
+        f"lengths{tag}": finger.lengths,
+        f"axes{tag}": finger.axes,
+        f"bends{tag}": finger.bends,
+    }
 
 
 def frames(finger: FingerSeed) -> Array:

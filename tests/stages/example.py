@@ -138,6 +138,7 @@ def made_up_finger(model: Model, joints: int, strings: int, seed: int, bend: flo
         lengths=rng.uniform(0.9, 2.0, joints),
         frames=Rotation.random(joints, rng=rng).as_matrix(),
         axes=rng.uniform(-0.7, 0.7, (joints, 2)),
+        bends=rng.uniform(-0.4, 0.4, (joints, 2)),
         angles=rng.uniform(-bend, bend, (len(model.schedule.keyframes), joints)),
         tips=rng.uniform(-0.25, 0.25, (strings, 2)),
     )
@@ -312,8 +313,8 @@ class PinFinger:
     def chain(self, angles: Array) -> tuple[Array, Array]:
         """Joint origins and tip (n + 1, 3), and the rotation of the last link."""
         rotation, points = np.eye(3), [np.append(self.seed.base, STAND * self.radius)]
-        for axis, length, angle in zip(self.axes, self.seed.lengths, angles, strict=True):
-            rotation = rotation @ pin.exp3(angle * axis)
+        for axis, bend, length, angle in zip(self.axes, self.seed.bends, self.seed.lengths, angles, strict=True):
+            rotation = rotation @ pin.exp3(np.append(bend, 0.0)) @ pin.exp3(angle * axis)
             points.append(points[-1] + length * rotation[:, 2])
         return np.array(points), rotation
 

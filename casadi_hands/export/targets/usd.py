@@ -135,13 +135,13 @@ def _add_drive(usd: Any, joint: Any, motor: Motor, target: float, effort: float)
 
 
 def _pose(usd: Any, stage: Any, source: Source) -> None:
-    """Turn every link to its joint's first angle; at zero angles its frame is parallel to its parent's."""
+    """Turn every link to its joint's first angle."""
     angles = dict(zip(source.motion.joint_names, source.motion.joint_angles[0], strict=True))
     for i, finger in enumerate(source.hand.fingers):
         path = next(prim.GetPath() for prim in stage.Traverse() if prim.GetName() == "palm")
         for j, link in enumerate(finger.links):
             path = path.AppendChild(f"finger{i}_link{j}")
-            turn = Rotation.from_rotvec(angles[f"finger{i}_joint{j}"] * np.asarray(link.axis))
+            turn = link.turn * Rotation.from_rotvec(angles[f"finger{i}_joint{j}"] * np.asarray(link.axis))
             orientation = usd.Gf.Quatf(*turn.as_quat(scalar_first=True).tolist())
             stage.GetPrimAtPath(path).GetAttribute("xformOp:orient").Set(orientation)
     purposes = [usd.UsdGeom.Tokens.default_, usd.UsdGeom.Tokens.render, usd.UsdGeom.Tokens.proxy]

@@ -69,6 +69,14 @@ SE3 translation(const Vector3 & offset)
   return SE3(Matrix3::Identity(), offset);
 }
 
+Matrix3 rotation(const SX & matrices, int j)
+{
+  Matrix3 result;
+  for (int k = 0; k < 3; ++k)
+    result.col(k) = column(matrices, 3 * j + k);
+  return result;
+}
+
 Vector3 along_z(const SX & length)
 {
   return Vector3(SX(0), SX(0), length);
@@ -79,6 +87,7 @@ struct Finger
 {
   explicit Finger(int joints)
   : base(SX::sym("base", 3))
+  , turns(SX::sym("turns", 3, 3 * joints))
   , axes(SX::sym("axes", 3, joints))
   , lengths(SX::sym("lengths", joints))
   , point(SX::sym("point", 3))
@@ -88,7 +97,8 @@ struct Finger
     {
       const Vector3 origin = j == 0 ? column(base, 0) : along_z(lengths(j - 1));
       // The vector constructor takes the axis as it is; the one of three scalars would divide by its norm.
-      last = model.addJoint(last, Joint(Axis(column(axes, j))), translation(origin), "joint" + std::to_string(j));
+      last = model.addJoint(
+        last, Joint(Axis(column(axes, j))), SE3(rotation(turns, j), origin), "joint" + std::to_string(j));
     }
     tip = add_frame("tip", last, along_z(lengths(joints - 1)));
     contact = add_frame("contact", last, column(point, 0));
@@ -100,6 +110,7 @@ struct Finger
   }
 
   SX base;
+  SX turns;
   SX axes;
   SX lengths;
   SX point;
@@ -131,10 +142,10 @@ std::string finger_kinematics(int joints)
   }
   const casadi::Function function(
     "finger_kinematics_" + std::to_string(joints),
-    {finger.base, finger.axes, finger.lengths, angles, finger.point},
+    {finger.base, finger.turns, finger.axes, finger.lengths, angles, finger.point},
     {SX::horzcat(origins), SX::horzcat(rotations), to_casadi(data.oMf[finger.tip].translation()),
      to_casadi(data.oMf[finger.contact].translation()), to_casadi(jacobian.topRows<3>())},
-    {"base", "axes", "lengths", "angles", "point"}, {"origins", "rotations", "tip", "contact", "jacobian"});
+    {"base", "turns", "axes", "lengths", "angles", "point"}, {"origins", "rotations", "tip", "contact", "jacobian"});
   return function.serialize();
 }
 

@@ -13,10 +13,10 @@ ALIKE = 0.3
 
 
 def difference(first: Hand, second: Hand, length: float) -> float:
-    """How different two hands are: the largest difference of any finger's base, link's length or joint's axis.
+    """How different two hands are: the largest difference of any finger's base, link's length, bend or joint's axis.
 
-    Distances of bases and differences of lengths are over ``length``, angles between axes in rad. An axis is a line:
-    turned around, the joint counts its angle the other way and moves in the same way.
+    Distances of bases and differences of lengths are over ``length``, angles between axes and differences of bends in
+    rad. An axis is a line: turned around, the joint counts its angle the other way and moves in the same way.
 
     Args:
         first: a hand.
@@ -40,6 +40,7 @@ def _finger_difference(first: Finger, second: Finger, length: float) -> float:
     parts = [math.dist(first.base, second.base) / length]
     for one, other in zip(first.links, second.links, strict=True):
         parts.append(abs(one.length - other.length) / length)
+        parts.append(math.dist(one.bend, other.bend))
         # By sine and cosine: the arc cosine alone loses small angles.
         sine = float(np.linalg.norm(np.cross(one.axis, other.axis)))
         parts.append(math.atan2(sine, abs(float(np.dot(one.axis, other.axis)))))

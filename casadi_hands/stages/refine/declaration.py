@@ -90,6 +90,7 @@ class Declaration:
                 "base": (2, -reach, reach),
                 "lengths": (n, *model.link_length),
                 "axes": (2 * n, -AXIS_RANGE, AXIS_RANGE),
+                "bends": (2 * n, -model.bend, model.bend),
             }
             self.shape.append(
                 {
@@ -124,7 +125,8 @@ class Declaration:
             self._own("tie", c, (1, 1))
             if n in MARGIN_SIZES:
                 self._own("margin_direction", c, (count, MARGIN_SIZES[n]))
-            for name, width in (("frames", 9 * n), ("wanted_base", 2), ("wanted_lengths", n), ("wanted_axes", 2 * n)):
+            wanted = {"wanted_base": 2, "wanted_lengths": n, "wanted_axes": 2 * n, "wanted_bends": 2 * n}
+            for name, width in ({"frames": 9 * n} | wanted).items():
                 self._own(name, c, (1, width))
 
     def _own(self, name: str, contact: int, shape: tuple[int, int]) -> None:

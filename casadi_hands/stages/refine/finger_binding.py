@@ -6,6 +6,7 @@ import numpy as np
 
 from casadi_hands.kinematics.singularity import MARGIN_SIZES
 from casadi_hands.nlp import Parameter, Rows
+from casadi_hands.stages.buildable import buildable, buildable_bounds
 from casadi_hands.stages.refine import finger_kernels as kernels
 from casadi_hands.stages.refine.declaration import FREE, IN_CONE, Bounds, Declaration, Knots
 
@@ -161,9 +162,13 @@ def bind_shape(of: Declaration, i: int) -> None:
     first = np.array([k for k in range(count - 3) if k + 1 not in switches and k + 2 not in switches], int)
     four = [of.angles[i].take(first + offset) for offset in range(4)]
     problem.bind(kernels.joint_jerk(n), angles=four, step=of.steps(first, first + 1, first + 2))
-    wanted = of.of(c, first, "wanted_base", "wanted_lengths", "wanted_axes")
+    wanted = of.of(c, first, *[f"wanted_{name}" for name in of.shape[i]])
     reach = (model.palm_radius - model.link_radius) ** 2
     of.bind(None, kernels.near_design(n), {"on_palm": (0, reach)}, (c,), f"near_design{c}", **of.shape[i], **wanted)
+    if model.hinged or model.bend:
+        shape = {name: of.shape[i][name] for name in ("axes", "bends")} | {"frames": problem[f"frames{c}"]}
+        kernel = buildable(n, model.hinged, bool(model.bend))
+        of.bind(None, kernel, buildable_bounds(model), (c,), f"buildable{c}", **shape)
 
 
 def bind_pair(of: Declaration, i: int, j: int, guarded: bool) -> None:

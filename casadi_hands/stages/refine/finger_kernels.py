@@ -27,7 +27,7 @@ LEAST_SINGULAR_VALUE = 0.06  # lengths/rad: forces along smaller singular values
 
 
 def free_morphology(kernel: Kernel, joints: int, place: int | None = None) -> FingerSymbols:
-    """A finger whose morphology is variables: base, lengths, axis coordinates; its seed frames are a parameter."""
+    """A finger whose morphology is variables: base, lengths, axis coordinates, bends; its frames are a parameter."""
     frames = kernel.parameter("frames" if place is None else f"frames{place}", 9 * joints, "frames", place)
     return morphology(kernel.variable, frames, joints, place)
 
@@ -288,12 +288,9 @@ def joint_jerk(joints: int) -> Kernel:
 def near_design(joints: int) -> Kernel:
     """A finger's morphology: short, on the palm, and near what the synthesis found."""
     kernel = Kernel("near_design")
-    base, lengths, axes = (
-        kernel.variable("base", 2),
-        kernel.variable("lengths", joints),
-        kernel.variable("axes", 2 * joints),
-    )
-    wanted = [kernel.parameter(f"wanted_{n}", k) for n, k in (("base", 2), ("lengths", joints), ("axes", 2 * joints))]
-    kernel.cost(finger.STAY_DESIGN, ca.vertcat(base - wanted[0], lengths - wanted[1], axes - wanted[2]))
-    kernel.constrain(limits.ON_PALM, ca.sumsqr(base))
+    sizes = {"base": 2, "lengths": joints, "axes": 2 * joints, "bends": 2 * joints}
+    shape = {name: kernel.variable(name, size) for name, size in sizes.items()}
+    off = [shape[name] - kernel.parameter(f"wanted_{name}", size) for name, size in sizes.items()]
+    kernel.cost(finger.STAY_DESIGN, ca.vertcat(*off))
+    kernel.constrain(limits.ON_PALM, ca.sumsqr(shape["base"]))
     return kernel

@@ -23,7 +23,7 @@ def pass_through(structure: Structure, hand: WholeHand) -> bool:
     weights, radius = structure.inner.weights(), structure.model.link_radius
     if not len(weights):
         return False
-    shapes = [np.concatenate([f.base, f.lengths, f.axes.reshape(-1)]) for f in hand.fingers]
+    shapes = [np.concatenate([f.base, f.lengths, f.axes.reshape(-1), f.bends.reshape(-1)]) for f in hand.fingers]
     moving = [_columns(s, weights @ angles) for s, angles in zip(shapes, hand.angles, strict=True)]
     frames = [f.frames.transpose(0, 2, 1).reshape(-1) for f in hand.fingers]
     count = len(weights)

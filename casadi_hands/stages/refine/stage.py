@@ -210,6 +210,7 @@ class RefineStage:
                 base=values[f"base{c}"][0],
                 lengths=values[f"lengths{c}"][0],
                 axes=values[f"axes{c}"].reshape(-1, 2),
+                bends=values[f"bends{c}"].reshape(-1, 2),
                 angles=values[f"angles{c}"][self.model.schedule.keyframe_samples],
             )
             for c, old in zip(self.contacts, start.fingers, strict=True)

@@ -172,7 +172,7 @@ class RefineValues:
             values["force_disturbed"] = disturbed.reshape(len(k), -1)
         for c, finger, angles in zip(self.structure.contacts, motion.fingers, motion.angles, strict=True):
             values |= {f"angles{c}": angles, f"base{c}": finger.base, f"lengths{c}": finger.lengths}
-            values[f"axes{c}"] = finger.axes.reshape(1, -1)
+            values |= {f"axes{c}": finger.axes.reshape(1, -1), f"bends{c}": finger.bends.reshape(1, -1)}
         return values
 
     @property
@@ -247,6 +247,7 @@ class RefineValues:
             values[f"frames{c}"] = finger.frames.transpose(0, 2, 1).reshape(1, -1)
             values[f"wanted_base{c}"], values[f"wanted_lengths{c}"] = finger.base, finger.lengths
             values[f"wanted_axes{c}"] = finger.axes.reshape(1, -1)
+            values[f"wanted_bends{c}"] = finger.bends.reshape(1, -1)
             values[f"tie{c}"] = SLIDING_TIE if model.slides(c) else LIFTING_TIE if model.lifts(c) else 1.0
             values[f"helper{c}"] = _helpers(motion.point[:, c], model.touched[c])
         return values

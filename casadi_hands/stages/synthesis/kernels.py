@@ -48,6 +48,7 @@ def build(joints: int) -> Kernel:
     """One finger's shape: eq. 2.21, 2.22 and 2.25."""
     kernel = Kernel("build")
     base, lengths = kernel.variable("base", 2), kernel.variable("lengths", joints)
+    kernel.cost(finger.BEND, kernel.variable("bends", 2 * joints))
     palm_radius, radius, shortest, longest = (
         kernel.parameter(n) for n in ("palm_radius", "link_radius", "shortest", "longest")
     )

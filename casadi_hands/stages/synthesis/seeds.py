@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from casadi_hands.kinematics import STAND
 from casadi_hands.kinematics.morphology import FingerSeed, frame_about
 from casadi_hands.stages.synthesis.target import Target
 
 Array = NDArray[np.float64]
+SEED_BEND = np.pi / 4  # rad, largest of a seed's link
+TRIES = 50  # to draw an axis that a hinge can have
 
 
 def random_finger(target: Target, contact: int, joints: int, rng: np.random.Generator) -> FingerSeed:
@@ -25,14 +28,44 @@ def random_finger(target: Target, contact: int, joints: int, rng: np.random.Gene
     lengths = np.clip(rng.uniform(0.8, 1.6, joints) * span / joints, shortest, longest)
     angles = rng.uniform(0.6 * low, 0.6 * high, joints)
     tip = target.tip_arc * rng.uniform(-0.7, 0.7, (target.strings(contact), 2))
+    bends = _random_bends(joints, min(target.bend, SEED_BEND), rng)
+    links = [_links_beside(bend)[: 1 if j == 0 else 2] for j, bend in enumerate(bends)]
     return FingerSeed(
         base=base,
         lengths=lengths,
-        frames=np.array([frame_about(_random_axis(rng)) for _ in range(joints)]),
+        frames=np.array([frame_about(_hinge_axis(beside, target.model.axis_cosines, rng)) for beside in links]),
         axes=np.zeros((joints, 2)),
+        bends=bends,
         angles=np.tile(angles, (len(target.times), 1)),
         tips=tip,
     )
+
+
+def _random_bends(joints: int, most: float, rng: np.random.Generator) -> Array:
+    """Bends (n, 2), uniform over a disc; none are drawn where links are straight."""
+    if not most:
+        return np.zeros((joints, 2))
+    way, size = rng.uniform(0, 2 * np.pi, joints), most * np.sqrt(rng.uniform(size=joints))
+    return np.column_stack([size * np.cos(way), size * np.sin(way)])
+
+
+def _links_beside(bend: Array) -> Array:
+    """Directions (2, 3) of a link bent by (2,) and of the one before, in its frame."""
+    along = np.array([0.0, 0.0, 1.0])
+    return np.array([along, Rotation.from_rotvec([*bend, 0.0]).inv().apply(along)])
+
+
+def _hinge_axis(links: Array, cosines: tuple[float, float], rng: np.random.Generator) -> Array:
+    """An axis (3,) uniform over those with allowed cosines to links (K, 3); one across all of them if these are few."""
+    for _ in range(TRIES):
+        axis = _random_axis(rng)
+        size = np.abs(links @ axis)
+        if np.all((cosines[0] <= size) & (size <= cosines[1])):
+            return axis
+    across = np.cross(links[0], links[-1])
+    if np.linalg.norm(across) < 1e-3:
+        across = np.cross(links[0], axis)
+    return np.asarray(across / np.linalg.norm(across))
 
 
 def _random_axis(rng: np.random.Generator) -> Array:

@@ -13,6 +13,7 @@ from casadi_hands.geometry.bodies import width_of
 from casadi_hands.kinematics.morphology import FingerSeed
 from casadi_hands.motion import linear
 from casadi_hands.nlp import Options, Parameter, Problem, Rows, Solution, Solver
+from casadi_hands.stages.buildable import buildable, buildable_bounds
 from casadi_hands.stages.synthesis.kernels import build, collide, follow, keep_apart, travel
 from casadi_hands.stages.synthesis.target import Target
 
@@ -22,6 +23,7 @@ OPTIONS = Options(max_iter=150, tol=1e-3, acceptable_tol=1e-2, mu_init=1e-3)
 BETWEEN = 2  # collision samples between neighbouring keyframes
 AXIS_RANGE = 2.2  # rad, how far an axis may turn from its seed
 MARGIN = 0.03  # clearance asked of bodies that need not touch, lengths
+MORPHOLOGY = ("base", "lengths", "axes", "bends")
 LOOSE = 0.4  # how far the box bounds of angles and lengths are opened while annealing
 
 
@@ -64,6 +66,7 @@ class SynthesisStage:
                 "base": ((1, 2), -reach, reach),
                 "lengths": ((1, n), shortest, longest),
                 "axes": ((1, 2 * n), -AXIS_RANGE, AXIS_RANGE),
+                "bends": ((1, 2 * n), -target.bend, target.bend),
                 "angles": ((count, n), *target.joint_limits),
                 "tips": ((target.strings(c), 2), -arc, arc),
             }
@@ -95,7 +98,7 @@ class SynthesisStage:
 
         frames = own("frames", (1, 9 * n))
         wanted = {name: own(name, (count, width)) for name, width in (("target", 3), ("force", 3), ("active", 1))}
-        body = {name: rows[name] for name in ("base", "lengths", "axes")}
+        body = {name: rows[name] for name in MORPHOLOGY}
 
         def constant(instances: int) -> dict[str, Rows]:
             return {name: row.constant(instances) for name, row in body.items()}
@@ -110,7 +113,10 @@ class SynthesisStage:
             **problem.given("link_radius", "lowest", "highest"),
         )
         limits = problem.given("palm_radius", "link_radius", "shortest", "longest")
-        problem.bind(build(n), base=rows["base"], lengths=rows["lengths"], **limits)
+        problem.bind(build(n), base=rows["base"], lengths=rows["lengths"], bends=rows["bends"], **limits)
+        if target.model.hinged or target.bend:
+            kernel, bounds = buildable(n, target.model.hinged, bool(target.bend)), buildable_bounds(target.model)
+            problem.bind(kernel, bounds, f"buildable{c}", axes=rows["axes"], bends=rows["bends"], frames=frames)
         times = target.collision_times(BETWEEN)
         problem.bind(
             collide(n, target.kinds),
@@ -129,7 +135,7 @@ class SynthesisStage:
         times = self.target.collision_times(BETWEEN)
         weights = linear(self.target.times, times)
         both = rows, others
-        shapes = {name: [r[name].constant(len(times)) for r in both] for name in ("base", "lengths", "axes")}
+        shapes = {name: [r[name].constant(len(times)) for r in both] for name in MORPHOLOGY}
         self.problem.bind(
             keep_apart(self.joints[i], self.joints[j]),
             **shapes,
@@ -171,6 +177,7 @@ class SynthesisStage:
             values[f"base{contact}"] = seed.base
             values[f"lengths{contact}"] = seed.lengths
             values[f"axes{contact}"] = seed.axes.reshape(1, -1)
+            values[f"bends{contact}"] = seed.bends.reshape(1, -1)
             values[f"angles{contact}"] = seed.angles
             values[f"tips{contact}"] = seed.tips
         return values
@@ -221,6 +228,7 @@ class SynthesisStage:
             lengths=values[f"lengths{contact}"][0],
             frames=seed.frames,
             axes=values[f"axes{contact}"].reshape(-1, 2),
+            bends=values[f"bends{contact}"].reshape(-1, 2),
             angles=values[f"angles{contact}"],
             tips=values[f"tips{contact}"],
         )

@@ -19,7 +19,7 @@ from casadi_hands.terms import clearance, contact, finger
 
 
 def given_morphology(kernel: Kernel, joints: int, place: int | None = None) -> FingerSymbols:
-    """A finger whose morphology is parameters: seed frames, base, lengths, axis coordinates."""
+    """A finger whose morphology is parameters: seed frames, base, lengths, axis coordinates, bends."""
     tag = "" if place is None else str(place)
     frames = kernel.parameter(f"frames{tag}", 9 * joints, "frames", place)
     return morphology(kernel.parameter, frames, joints, place)

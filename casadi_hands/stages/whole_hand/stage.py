@@ -62,7 +62,7 @@ class WholeHandStage:
         for name, width in (("palm_position", 3), ("palm_quaternion", 4)):
             problem.parameter(f"{name}_before", (samples, width), quantity=name, when=-1)
         for c, n in zip(contacts, joints, strict=True):
-            for name, width in (("frames", 9 * n), ("base", 2), ("lengths", n), ("axes", 2 * n)):
+            for name, width in (("frames", 9 * n), ("base", 2), ("lengths", n), ("axes", 2 * n), ("bends", 2 * n)):
                 problem.parameter(f"{name}{c}", (1, width), quantity=name, owner=c)
         for c in contacts:
             self._bind_finger(side, c, angles, palm)
@@ -122,7 +122,7 @@ class WholeHandStage:
             )
 
     def _morphology(self, contact: int) -> dict[str, Parameter]:
-        return {name: self.problem[f"{name}{contact}"] for name in ("frames", "base", "lengths", "axes")}
+        return {name: self.problem[f"{name}{contact}"] for name in ("frames", "base", "lengths", "axes", "bends")}
 
     def solve(
         self,
@@ -184,6 +184,7 @@ class WholeHandStage:
             values[f"frames{c}"] = finger.frames.transpose(0, 2, 1).reshape(1, -1)
             values[f"base{c}"], values[f"lengths{c}"] = finger.base, finger.lengths
             values[f"axes{c}"] = finger.axes.reshape(1, -1)
+            values[f"bends{c}"] = finger.bends.reshape(1, -1)
         if self.palm_moves:
             values["keyframe_step"] = float(np.mean(np.diff(model.schedule.keyframes)))
         return values
@@ -194,7 +195,7 @@ class WholeHandStage:
         joined = schedule.spline()
         pose = poses_at(model, values["pose"])
         moved = tuple(
-            FingerSeed(f.base, f.lengths, f.frames, f.axes, values[f"angles{c}"], f.tips)
+            FingerSeed(f.base, f.lengths, f.frames, f.axes, f.bends, values[f"angles{c}"], f.tips)
             for c, f in zip(self.contacts, fingers, strict=True)
         )
         position, orientation = model.palm_position, model.palm_quaternion

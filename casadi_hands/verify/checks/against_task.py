@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from casadi_hands.verify.figures.wrench import planned_torques
 from casadi_hands.verify.reading.folder import Folder
@@ -12,11 +13,18 @@ STAND = 1.05
 """Link radii above the palm's face that a finger's first joint stands: its first link just clears the palm."""
 ROUNDED = 1e-6
 """Share by which a size may be off."""
+ROUNDED_ANGLE = 1e-4
+"""Degrees by which an angle may be off."""
 
 
 def hand_task_problems(folder: Folder, path: Trajectory) -> list[str]:
     """Return where the hand is not one that the task allows, or its joints cannot do the motion, a sentence each."""
-    return [*_joint_problems(folder), *_size_problems(folder), *_motor_problems(folder, path)]
+    return [
+        *_joint_problems(folder),
+        *_hinge_problems(folder),
+        *_size_problems(folder),
+        *_motor_problems(folder, path),
+    ]
 
 
 def _joint_problems(folder: Folder) -> list[str]:
@@ -37,6 +45,27 @@ def _joint_problems(folder: Folder) -> list[str]:
     for finger, count in counts.items():
         if count > most:
             problems.append(f"finger '{finger}' has {count} joints; the task allows {most} (search.max_joints)")
+    return problems
+
+
+def _hinge_problems(folder: Folder) -> list[str]:
+    """Return which links are bent farther than the task allows, and which axes stand too near to a link."""
+    hand, problems = folder.task.hand, []
+    least, largest = hand.axes.from_link
+    for name, joint in folder.joints.items():
+        who, turn = folder.call(name.replace("_joint", "_link")), Rotation.from_euler("xyz", joint.turn)
+        own = np.array([0.0, 0.0, 1.0])
+        before = turn.inv().apply(own)
+        bend = float(np.rad2deg(np.arccos(np.clip(before[2], -1.0, 1.0))))
+        if bend > hand.bend + ROUNDED_ANGLE:
+            problems.append(f"{who} is bent by {bend:.4g}° from the link before; the task allows {hand.bend:g}°")
+        beside = {"it": own} if joint.parent == "palm" else {"it": own, "the link before": before}
+        for what, link in beside.items():
+            cosine = abs(float(link @ joint.axis)) / float(np.linalg.norm(joint.axis))
+            angle = float(np.rad2deg(np.arccos(min(cosine, 1.0))))
+            if not least - ROUNDED_ANGLE <= angle <= largest + ROUNDED_ANGLE:
+                allowed = f"{least:g}° to {largest:g}°"
+                problems.append(f"{who}: its joint's axis stands {angle:.4g}° from {what}; the task allows {allowed}")
     return problems
 
 

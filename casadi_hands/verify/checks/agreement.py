@@ -208,8 +208,11 @@ def _link_problems(folder: Folder, name: str, stated: Any, parent: str, origin: 
         problems.append(f"{who}: its axis in result.json is not a unit vector")
     elif np.linalg.norm(axis - joint.axis) > 1e-6:
         problems.append(f"{who}: its axis in hand.urdf is not that of result.json")
-    if np.any(np.abs(joint.turn) > 1e-9):
-        problems.append(f"{who}: its frame in hand.urdf is turned at zero angle")
+    bend = as_array(entry(stated, "bend"), (2,)) if "bend" in stated else np.zeros(2)
+    if bend is None:
+        problems.append(f"{who}: result.json states no bend of two numbers")
+    elif (Rotation.from_rotvec([*bend, 0.0]).inv() * Rotation.from_euler("xyz", joint.turn)).magnitude() > 1e-6:
+        problems.append(f"{who}: its frame in hand.urdf is not turned at zero angle as result.json has it bent")
     span, round_ = float(length), float(radius)
     slices = [(-round_, 0.0, 0.0, round_), (0.0, span, round_, round_), (span, span + round_, round_, 0.0)]
     return problems + _mass_problems(folder, who, body, slices, tip / 2)

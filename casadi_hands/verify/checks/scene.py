@@ -95,6 +95,7 @@ def _body_problems(folder: Folder, scene: Scene) -> list[str]:
         else:
             reference = float(motion.joint_angles[0, motion.joint_names.index(joint.name)])
             turn = Rotation.from_rotvec(reference * joint.axis / np.linalg.norm(joint.axis))
+            turn = Rotation.from_euler("xyz", joint.turn) * turn
             position, orientation, parent = joint.position, turn.as_quat(scalar_first=True), joint.parent
         if body.parent != parent:
             problems.append(f"{who} hangs on {body.parent}, not on {parent}")

@@ -181,6 +181,7 @@ UPRIGHT = FingerSeed(
     lengths=np.array([REACH]),
     frames=np.array([[[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]]),
     axes=np.zeros((1, 2)),
+    bends=np.zeros((1, 2)),
     angles=np.zeros((1, 1)),
     tips=np.zeros((1, 2)),
 )
@@ -280,6 +281,12 @@ def pair_block(one: FingerSeed, other: FingerSeed) -> Block:
     return variables, {"frames0": frames(one), "frames1": frames(other), "radius": RADIUS}
 
 
+def beside_joint(link: tuple[Array, Array], after: tuple[Array, Array]) -> float:
+    """How far two links are apart a hinge's length beyond the joint between them."""
+    balls = [at + 2 * RADIUS * (end - at) / np.linalg.norm(end - at) for at, end in (link[::-1], after)]
+    return float(np.linalg.norm(balls[0] - balls[1]) - 2 * RADIUS)
+
+
 @pytest.mark.parametrize(("touched", "grounded"), [(None, False), (1, False), (None, True), (0, True)])
 def test_clearances_of_a_finger_are_those_of_coal(touched: int | None, grounded: bool) -> None:
     joints = 3
@@ -294,6 +301,7 @@ def test_clearances_of_a_finger_are_those_of_coal(touched: int | None, grounded:
         for start, end in links[1:]:
             expected += [palm_apart(p, PALM_RADIUS) - RADIUS for p in ((start + end) / 2, end)]
         expected.append(between(links[0], links[2], 2 * RADIUS))
+        expected += [beside_joint(*pair) for pair in itertools.pairwise(links)]
         if grounded:
             joints_and_tip = [links[0][0], *[end for _, end in links]]
             heights = [(place.palm.apply(p) + place.palm_position)[2] for p in joints_and_tip]
@@ -343,7 +351,7 @@ def test_smoothness_and_staying() -> None:
     np.testing.assert_allclose(found["joint_jerk"], sum(c.deriv(3)(0.0) ** 2 for c in curve), rtol=1e-9)
     finger, other = random_finger(2, rng), random_finger(2, rng)
     found = numbers(finger_kernels.near_design(2), *stay_block(finger, other))
-    apart = [finger.base - other.base, finger.lengths - other.lengths, finger.axes - other.axes]
+    apart = [getattr(finger, name) - getattr(other, name) for name in ("base", "lengths", "axes", "bends")]
     np.testing.assert_allclose(found["stay_design"], sum((a**2).sum() for a in apart), rtol=1e-12)
     np.testing.assert_allclose(found["on_palm"], finger.base @ finger.base, rtol=1e-12)
 

@@ -178,7 +178,7 @@ def test_forces_are_actuated_in_the_middle_between_knots_too(loaded: MadeUp) -> 
         for row, k in zip(found[f"inter_knot{c}.structural"], intervals, strict=True):
             moving = (values["pose"], loaded.points[:, i], values[f"angles{c}"], loaded.forces[:, i])
             middles = [(array[k] + array[k + 1]) / 2 for array in moving]
-            variables = {name: values[f"{name}{c}"] for name in ("base", "lengths", "axes")}
+            variables = {name: values[f"{name}{c}"] for name in ("base", "lengths", "axes", "bends")}
             parameters = {
                 "frames": frames(finger),
                 "reference": model.reference,
@@ -200,7 +200,7 @@ def test_lifted_fingers_are_clear_in_the_middle_between_knots_too(loaded: MadeUp
     assert len(found["apart_between2.clear"]) == len(intervals) > 0
     kernel = finger_kernels.apart(2, model.kinds, None, model.ground is not None)
     for row, k in zip(found["apart_between2.clear"], intervals, strict=True):
-        variables = {name: values[f"{name}2"] for name in ("base", "lengths", "axes")}
+        variables = {name: values[f"{name}2"] for name in ("base", "lengths", "axes", "bends")}
         variables |= {
             name: (values[of][k] + values[of][k + 1]) / 2 for name, of in (("pose", "pose"), ("angles", "angles2"))
         }
@@ -227,7 +227,7 @@ def test_guarded_fingers_are_clear_of_each_other_every_tenth_of_a_second(loaded:
         for share in np.arange(1, parts) / parts:
             variables, parameters = {}, {}
             for tag, i, c in (("0", 1, 2), ("1", 0, 0)):
-                variables |= {f"{name}{tag}": values[f"{name}{c}"] for name in ("base", "lengths", "axes")}
+                variables |= {f"{name}{tag}": values[f"{name}{c}"] for name in ("base", "lengths", "axes", "bends")}
                 variables[f"angles{tag}"] = (1 - share) * values[f"angles{c}"][k] + share * values[f"angles{c}"][k + 1]
                 parameters[f"frames{tag}"] = frames(wide.start.fingers[i])
             parameters["radius"] = wide.model.link_radius

@@ -384,6 +384,7 @@ def test_one_joint_cannot_roll_with_the_object_and_no_exact_solve_is_tried(solve
             lengths=finger.lengths.sum(keepdims=True),
             frames=finger.frames[:1],
             axes=finger.axes[:1],
+            bends=finger.bends[:1],
             angles=finger.angles[:, :1],
         )
         for finger in whole.fingers

@@ -73,6 +73,7 @@ def pointing(target: Target, contact: int, axes: list[list[float]]) -> FingerSee
         lengths=lengths,
         frames=np.array(frames),
         axes=np.zeros((joints, 2)),
+        bends=np.zeros((joints, 2)),
         angles=np.zeros((len(target.times), joints)),
         tips=np.zeros((1, 2)),
     )

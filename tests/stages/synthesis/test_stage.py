@@ -32,6 +32,7 @@ MARGIN = 0.03  # clearance asked of what need not touch, lengths
 JOINTS = (1, 2, 3)
 BENDS = (1.8, 1.8, 0.4)  # rad: two beyond the joint limits, one straight into the object
 TERMS = {
+    "bend",
     "tip_target",
     "null_space",
     "torque",
@@ -91,6 +92,7 @@ class Witness:
     def build(self, total: dict[str, float], seed: FingerSeed) -> None:
         shortest, longest = self.model.link_length
         total["length"] += (seed.lengths**2).sum()
+        total["bend"] += (seed.bends**2).sum()
         total["minimum_length"] += float((g(shortest - seed.lengths) + g(seed.lengths - longest)).sum())
         edge = self.model.palm_radius - self.model.link_radius
         total["finger_base"] += float(g(np.linalg.norm(seed.base) - edge))
@@ -172,7 +174,7 @@ def test_term_is_its_equation(term: str, step: int, case: Case) -> None:
     weight = case.weights[term]
     weight = weight[step] if isinstance(weight, tuple) else weight
     keyframes = len(case.target.times)
-    once = {"length": 1, "minimum_length": 1, "finger_base": 1, "collision": 3 * (keyframes - 1) + 1}
+    once = {"length": 1, "bend": 1, "minimum_length": 1, "finger_base": 1, "collision": 3 * (keyframes - 1) + 1}
     expected = weight * case.expected[term] / once.get(term, keyframes)
     assert expected > 1e-6
     assert case.evaluate(case.weights, step)[term] == pytest.approx(expected, rel=2e-3)

@@ -60,5 +60,5 @@ def test_two_jobs_find_what_one_finds() -> None:
         assert one.scores == other.scores
         assert one.hand.solution.objective == other.hand.solution.objective
         for a, b in zip(one.hand.fingers, other.hand.fingers, strict=True):
-            for name in ("base", "lengths", "axes", "angles", "tips"):
+            for name in ("base", "lengths", "axes", "bends", "angles", "tips"):
                 np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
