@@ -6,7 +6,8 @@ from typing import Annotated
 
 from pydantic import Field, field_validator
 
-from casadi_hands.task.fields import NonNegative, Number, Pair, Positive, Section, Vector, refuse
+from casadi_hands.task.fields import NonNegative, Number, Pair, Positive, Section, Vector, follows, refuse
+from casadi_hands.task.material import DEFAULT_MATERIAL, MATERIALS, SAFETY, Material
 
 USUAL_STIFFNESS = 1.0
 """N·m/rad. An 18 g servo (Dynamixel XL330-M288, by its maker's manual) gives its stall torque, 0.52 N·m, where the
@@ -92,7 +93,19 @@ class HandSpec(Section):
         "degrees. 0 gives links that are straight on from each other.",
     )
     axes: Axes = Field(default=Axes(), description="How joints are turned in their links.")
-    density: Positive = Field(default=1150.0, description="Density of links and palm, kg/m³.")
+    material: Material = Field(
+        default=MATERIALS[DEFAULT_MATERIAL],
+        description="What links are made of: PLA, PETG, ABS, PA12, aluminium-6061, or a mapping.",
+        json_schema_extra={"default": DEFAULT_MATERIAL},
+    )
+    safety_factor: Annotated[Number, Field(ge=1)] = Field(
+        default=SAFETY, description="Of the material's strength over the stress that links and hinges may have."
+    )
+    density: Positive = Field(
+        default_factory=follows(lambda data: data["material"].density),
+        description="Density of links and palm, kg/m³; less than the material's for links that are not solid.",
+        json_schema_extra={"default": "that of the material"},
+    )
     contact_force: Positive | None = Field(
         default=None,
         description="Largest component of a contact force along an axis of the object frame, over the object's weight.",

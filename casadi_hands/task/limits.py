@@ -6,6 +6,9 @@ from pydantic import Field
 
 from casadi_hands.task.fields import NonNegative, Section
 
+USUAL_DEFLECTION = 0.02
+"""Of the characteristic length: the default of ``tip_deflection``."""
+
 
 def usual_replay_position(characteristic_length: float) -> float:
     """The default of ``replay_position``, m, for an object with this characteristic length, m."""
@@ -65,6 +68,26 @@ class Limits(Section):
         default=1.0,
         description="Least stiffness of the joints with which the planned grasp holds itself, N·m/rad.",
         json_schema_extra={"default": "`actuator.stiffness`"},
+    )
+    bearing_force: NonNegative = Field(
+        default=0.0,
+        description="Force on the bearing of a joint, N.",
+        json_schema_extra={"default": "strength of hand.material / safety_factor × link_radius² / 25"},
+    )
+    bearing_moment: NonNegative = Field(
+        default=0.0,
+        description="Moment on the bearing of a joint, across its axis, N·m.",
+        json_schema_extra={"default": "strength of hand.material / safety_factor × link_radius³ × 2/15"},
+    )
+    link_stress: NonNegative = Field(
+        default=0.0,
+        description="Stress in a link, Pa.",
+        json_schema_extra={"default": "strength of hand.material / safety_factor"},
+    )
+    tip_deflection: NonNegative = Field(
+        default=0.0,
+        description="How far loads bend the end of a finger away, m.",
+        json_schema_extra={"default": "2 % of the characteristic length"},
     )
     replay_position: NonNegative = Field(
         default=0.002,

@@ -10,7 +10,8 @@ from pydantic import Field, ValidationInfo, field_validator
 from casadi_hands.motion import nearest_exponential
 from casadi_hands.task.fields import Positive, Section, Vector, Whole, fill, follows, refuse
 from casadi_hands.task.hand import Actuator, FingerSpec, Fingertip, Ground, HandSpec, rubber_torsion
-from casadi_hands.task.limits import Limits, usual_replay_position
+from casadi_hands.task.limits import USUAL_DEFLECTION, Limits, usual_replay_position
+from casadi_hands.task.material import hinge_loads
 from casadi_hands.task.motion import Goal, Perturbation
 from casadi_hands.task.object import ManipulatedObject
 from casadi_hands.task.palm import Palm
@@ -111,10 +112,15 @@ class Task(Section):
     @field_validator("limits", mode="before")
     @classmethod
     def _limits_defaults(cls, value: Any, info: ValidationInfo) -> Any:
-        body = info.data.get("object")
+        body, hand = info.data.get("object"), info.data.get("hand")
         motor = info.data.get("actuator") or Actuator()
-        position = usual_replay_position(body.characteristic_length) if body else 1.0
-        return fill(value, replay_position=position, least_stiffness=motor.stiffness)
+        length = body.characteristic_length if body else 1.0
+        usual = {"replay_position": usual_replay_position(length), "tip_deflection": USUAL_DEFLECTION * length}
+        if hand:
+            usual["link_stress"] = hand.material.strength / hand.safety_factor
+            force, moment = hinge_loads(hand.material, hand.safety_factor, hand.link_radius)
+            usual |= {"bearing_force": force, "bearing_moment": moment}
+        return fill(value, least_stiffness=motor.stiffness, **usual)
 
     @property
     def draws(self) -> bool:
