@@ -12,8 +12,7 @@ from rich.text import Text
 
 from casadi_hands.diagnosis.impossible import impossibilities
 from casadi_hands.problem.si import build_model
-from casadi_hands.task import Goal, Limits, Task
-from casadi_hands.task.limits import usual_replay_position
+from casadi_hands.task import Goal, Task
 
 
 def check_summary(task: Task) -> tuple[RenderableType, bool]:
@@ -55,7 +54,7 @@ def _lines(task: Task, force_limit: float) -> Iterator[tuple[str, str]]:
             f"at most {search.max_joints} joints a finger, seed {search.seed}"
         ),
     )
-    usual = Limits(replay_position=usual_replay_position(task.object.characteristic_length))
+    usual = Task.model_validate(task.model_dump(by_alias=True, exclude_none=True, exclude={"limits"})).limits
     changed = {name: value for name, value in task.limits if value != getattr(usual, name)}
     if changed:
         yield (

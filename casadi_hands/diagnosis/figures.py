@@ -115,6 +115,13 @@ _ADVICE = {
     "unsupplied_force": "more joints (search.max_joints)",
     "disturbance_radius": "more fingers, or contacts farther apart",
     "least_stiffness": "stiffer motors (actuator.stiffness), thicker links (hand.link_radius), or more fingers",
+    "bearing_force": "thicker links (hand.link_radius), a stronger material (hand.material) or a lighter object",
+    "bearing_moment": "thicker or shorter links (hand.link_radius, hand.link_length) or a stronger material "
+    "(hand.material)",
+    "link_stress": "thicker or shorter links (hand.link_radius, hand.link_length) or a stronger material "
+    "(hand.material)",
+    "tip_deflection": "thicker or shorter links (hand.link_radius, hand.link_length), a stiffer material "
+    "(hand.material), or limits.tip_deflection as wide as you can accept",
     "replay_position": "another seed (--seed), more fingers, or limits.replay_position as wide as you can accept",
     "replay_angle": "a finger off the line between two contacts, or limits.replay_angle as wide as you can accept",
     "replay_dropped": GRASP_ADVICE,

@@ -28,6 +28,7 @@ from casadi_hands.verify.figures.dynamics import Shots, between_residual, sample
 from casadi_hands.verify.figures.goals import goal_figures, rest_figure
 from casadi_hands.verify.figures.sliding import sliding_figure
 from casadi_hands.verify.figures.stiffness import stability_figures
+from casadi_hands.verify.figures.structure import structure_figures
 from casadi_hands.verify.figures.torsion import torsion_figures
 from casadi_hands.verify.figures.wrench import disturbance_figure, torque_figure, unsupplied_figure
 from casadi_hands.verify.reading.folder import Folder, read_folder
@@ -102,6 +103,7 @@ def audit_files(directory: str | Path, task: str | Path | None = None) -> Audit:
         unsupplied_figure(folder),
         disturbance_figure(folder, placed),
         *stability_figures(folder),
+        *structure_figures(folder, placed),
     ]
     return Audit(folder.task.name, {figure.name: figure for figure in figures}, tuple(problems), limit_notes(folder))
 

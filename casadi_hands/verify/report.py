@@ -14,7 +14,9 @@ _UNITS = {
     "weight": (1.0, " of the weight"),
     "N·m/rad": (1.0, " N·m/rad"),
     "weight/mm": (1.0, " weights/mm"),
+    "N": (1.0, " N"),
     "N·m": (1.0, " N·m"),
+    "Pa": (1e-6, " MPa"),
     "rad/s": (1.0, " rad/s"),
     "share": (100.0, " %"),
     "m/s": (1000.0, " mm/s"),
@@ -22,11 +24,16 @@ _UNITS = {
 }
 
 UNIT_OF = {
-    **dict.fromkeys(("goal_position", "penetration", "gap", "gap_between", "slip", "replay_position"), "m"),
+    **dict.fromkeys(
+        ("goal_position", "penetration", "gap", "gap_between", "slip", "replay_position", "tip_deflection"), "m"
+    ),
     **dict.fromkeys(("goal_angle", "joint_limit", "replay_angle"), "deg"),
     **dict.fromkeys(("residual", "residual_between", "friction_excess", "pull", "unsupplied_force"), "weight"),
     "torsion_excess": "weight",
     "least_stiffness": "N·m/rad",
+    "bearing_force": "N",
+    "bearing_moment": "N·m",
+    "link_stress": "Pa",
     **dict.fromkeys(("speed", "torque", "replay_dropped", "torsion_shortfall", "slide_shortfall"), "share"),
     "disturbance_radius": "weight",
 }
@@ -52,7 +59,8 @@ class Figure:
         name: as in the certificate and, where it has a limit, in the task's ``limits``.
         value: the worst value over the motion, in ``unit``.
         limit: None when nothing is asked of the figure.
-        unit: ``m``, ``deg``, ``weight`` (the object's), ``share``, ``N·m``, ``rad/s`` or none.
+        unit: ``m``, ``deg``, ``weight`` (the object's), ``share``, ``N``, ``N·m``, ``Pa``, ``rad/s`` or
+            none.
         finding: the worst case as a sentence with ``{value}`` in it.
         at_least: whether the limit is a least value rather than a largest one.
         by_interval: of a figure between samples, what each interval (S - 1,) has of it, in ``unit``; of slip

@@ -77,7 +77,7 @@ HAND_AGAINST_TASK: Cases = {
         r"finger 'one' \(link 0\) is 26\.81 mm long",
     ),
     "one joint a finger": (task("max_joints: 3", "max_joints: 1"), r"finger 'one' has 2 joints; the task allows 1"),
-    "a lighter material": (task("density: 1150.0", "density: 500.0"), r"is not its volume times the task's density"),
+    "a lighter material": (task("density: 1240.0", "density: 500.0"), r"is not its volume times the task's density"),
     "a stated density": (record("hand", "density", value=500.0), r"density: result\.json says 500"),
     "a ground through the object": (task("ground: {height: 0.0", "ground: {height: 0.24"), r"above the ground"),
     "a ground through the palm": (task("ground: {height: 0.0", "ground: {height: 0.195"), r"ground"),
