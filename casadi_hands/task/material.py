@@ -59,8 +59,7 @@ MATERIALS: dict[str, Material] = {
 DEFAULT_MATERIAL = "PLA"
 
 SAFETY = 2.0
-"""Of a material's strength over the largest planned stress: prints scatter by a quarter, and what pushes a hand about
-in replays asks for forces half as large again as the plan's."""
+"""Of a material's strength over the largest planned stress: prints scatter, and bumps are not in the plan."""
 
 # The hinge that counts is as wide as a link is thick, 2 r: a tongue of one link between two cheeks of the other, cut
 # from its round end, on a pin of half its radius. With a tongue of 1.15 r and cheeks of 0.425 r, with pressure p,
