@@ -8,6 +8,7 @@ from pydantic import Field, field_validator
 
 from casadi_hands.task.fields import NonNegative, Number, Pair, Positive, Section, Vector, follows, refuse
 from casadi_hands.task.material import DEFAULT_MATERIAL, MATERIALS, SAFETY, Material
+from casadi_hands.task.servos import Drive
 
 USUAL_STIFFNESS = 1.0
 """N·m/rad. An 18 g servo (Dynamixel XL330-M288, by its maker's manual) gives its stall torque, 0.52 N·m, where the
@@ -83,7 +84,8 @@ class HandSpec(Section):
     link_length: Pair = Field(
         description="Shortest and longest link, m.",
         json_schema_extra={
-            "default": "[2 × link_radius, palm.radius + the farthest contact from the palm's centre over the goals]"
+            "default": "[2 × link_radius, palm.radius + the farthest contact from the palm's centre over the goals]; "
+            "with servos at least 2 × the radius of their ball"
         },
     )
     joint_limits: Pair = Field(default=(-90.0, 90.0), description="Lower and upper limit of every joint, degrees.")
@@ -93,6 +95,11 @@ class HandSpec(Section):
         "degrees. 0 gives links that are straight on from each other.",
     )
     axes: Axes = Field(default=Axes(), description="How joints are turned in their links.")
+    drive: Drive = Field(
+        default=Drive(),
+        description="Where motors are: remote (behind the palm, by tendon or belt), or {servo: NAME} in every joint.",
+        json_schema_extra={"default": "remote"},
+    )
     material: Material = Field(
         default=MATERIALS[DEFAULT_MATERIAL],
         description="What links are made of: PLA, PETG, ABS, PA12, aluminium-6061, or a mapping.",
@@ -134,12 +141,21 @@ class HandSpec(Section):
 class Actuator(Section):
     """The motor of every joint."""
 
-    torque: Positive | None = Field(default=None, description="Largest torque, N·m; free if not given.")
-    speed: Positive | None = Field(default=None, description="Largest speed, rad/s; free if not given.")
+    torque: Positive | None = Field(
+        default=None,
+        description="Largest torque, N·m; free if not given.",
+        json_schema_extra={"default": "none; of a servo its continuous torque"},
+    )
+    speed: Positive | None = Field(
+        default=None,
+        description="Largest speed, rad/s; free if not given.",
+        json_schema_extra={"default": "none; of a servo its speed at that torque"},
+    )
     stiffness: Positive = Field(
         default=USUAL_STIFFNESS,
         description="Torque by which a joint held at its set point resists a turn, N·m/rad, motor, gears and finger "
         "together.",
+        json_schema_extra={"default": f"{USUAL_STIFFNESS:g}; of a servo for which it is known its own"},
     )
     damping: Positive | None = Field(
         default=None,

@@ -16,6 +16,7 @@ from casadi_hands.task.motion import Goal, Perturbation
 from casadi_hands.task.object import ManipulatedObject
 from casadi_hands.task.palm import Palm
 from casadi_hands.task.search import Search
+from casadi_hands.task.servos import servo_reach
 from casadi_hands.task.weights import Weights
 
 STANDARD_GRAVITY = 9.81  # m/s²
@@ -57,7 +58,7 @@ class Task(Section):
     perturbations: tuple[Perturbation, ...] = Field(default=(), description="Disturbances that the grasp must stand.")
     hand: HandSpec = Field(default={}, validate_default=True, description="What fingers can be built.")
     fingertip: Fingertip = Field(default={}, validate_default=True, description="The tips of the fingers.")
-    actuator: Actuator = Field(default=Actuator(), description="The motors.")
+    actuator: Actuator = Field(default={}, validate_default=True, description="The motors.")
     limits: Limits = Field(default={}, validate_default=True, description="Limits of the certificate.")
     search: Search = Field(default=Search(), description="The search over structures.")
     weights: Weights = Field(default=Weights(), description="Weights of the soft stages' cost terms.")
@@ -100,8 +101,19 @@ class Task(Section):
         radius = value["link_radius"]
         if palm and fingers and goals and isinstance(radius, float | int):
             reach = palm.radius + _farthest_contact(palm, fingers, goals, info.data.get("tool"))
-            length = (2.0 * radius, max(2.0 * radius, reach))
+            shortest = 2.0 * max(radius, servo_reach(value.get("drive")))
+            length = (shortest, max(shortest, reach))
         return {**value, "link_length": length}
+
+    @field_validator("actuator", mode="before")
+    @classmethod
+    def _actuator_defaults(cls, value: Any, info: ValidationInfo) -> Any:
+        hand = info.data.get("hand")
+        servo = hand.drive.motor if hand else None
+        if servo is None:
+            return value
+        stiffness = {} if servo.stiffness is None else {"stiffness": servo.stiffness}
+        return fill(value, torque=servo.continuous, speed=servo.speed, **stiffness)
 
     @field_validator("fingertip", mode="before")
     @classmethod
