@@ -19,6 +19,7 @@ Choices a reader of the file should know:
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import pairwise
 from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, SubElement
@@ -38,7 +39,7 @@ from casadi_hands.export.markup import (
     numbers,
 )
 from casadi_hands.geometry.bodies import Solid
-from casadi_hands.problem.inertia import Inertial, link_inertial, palm_inertial
+from casadi_hands.problem.inertia import Inertial, body_inertials
 from casadi_hands.problem.motors import Motor, joint_motors
 
 if TYPE_CHECKING:
@@ -172,7 +173,8 @@ def _add_hand(world: Element, task: Task, hand: Hand, motion: Motion, motors: tu
     palm = SubElement(world, "body", start, name="palm", gravcomp="1")
     if moves:
         SubElement(palm, "freejoint", name="palm")
-    _add_inertial(palm, palm_inertial(hand))
+    inertials = body_inertials(hand)
+    _add_inertial(palm, inertials["palm"])
     friction = _friction(task)
     SubElement(
         palm,
@@ -188,11 +190,17 @@ def _add_hand(world: Element, task: Task, hand: Hand, motion: Motion, motors: tu
     for i, finger in enumerate(hand.fingers):
         names = [f"finger{i}_joint{j}" for j in range(len(finger.links))]
         joints = [(next(remaining), motion.joint_angles[0, motion.joint_names.index(name)]) for name in names]
-        _add_finger(palm, hand, i, finger, joints, friction)
+        _add_finger(palm, hand, i, finger, joints, friction, inertials)
 
 
 def _add_finger(
-    palm: Element, hand: Hand, i: int, finger: Finger, joints: list[tuple[Motor, float]], friction: str
+    palm: Element,
+    hand: Hand,
+    i: int,
+    finger: Finger,
+    joints: list[tuple[Motor, float]],
+    friction: str,
+    inertials: Mapping[str, Inertial],
 ) -> None:
     """Add one finger as a chain of nested bodies, turned as at the start.
 
@@ -203,6 +211,7 @@ def _add_finger(
         finger: its links.
         joints: motor and angle at the start, rad, of each joint.
         friction: of its surface.
+        inertials: of the hand's bodies, by name.
     """
     parent, origin = palm, np.asarray(finger.base)
     for j, (link, (motor, angle)) in enumerate(zip(finger.links, joints, strict=True)):
@@ -220,7 +229,7 @@ def _add_finger(
             range=numbers((hand.joint_lower, hand.joint_upper)),
             armature=number(motor.armature),
         )
-        _add_inertial(body, link_inertial(link, hand.density))
+        _add_inertial(body, inertials[name])
         tip = np.array([0.0, 0.0, link.length])
         _add_solid(
             body,

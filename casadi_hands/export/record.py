@@ -95,6 +95,7 @@ def hand_from_record(record: dict[str, Any]) -> Hand | None:
                 for finger in entry["fingers"]
             ),
             **{name: float(entry[name]) for name in _HAND_NUMBERS},
+            servo=None if entry.get("servo") is None else str(entry["servo"]),
         )
     except KeyError as error:
         raise DesignError(f"the hand lacks {error}") from error
@@ -120,6 +121,7 @@ def _hand(hand: Hand) -> dict[str, Any]:
             for finger in hand.fingers
         ],
         **{name: getattr(hand, name) for name in _HAND_NUMBERS},
+        **({} if hand.servo is None else {"servo": hand.servo}),
     }
 
 

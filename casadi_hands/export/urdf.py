@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, SubElement
 
@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from casadi_hands.export.markup import (
     OBJECT_COLOR,
     PALM_COLOR,
+    SERVO_COLOR,
     Color,
     document,
     finger_color,
@@ -20,7 +21,7 @@ from casadi_hands.export.markup import (
     numbers,
 )
 from casadi_hands.geometry.bodies import Solid
-from casadi_hands.problem.inertia import Inertial, link_inertial, palm_inertial
+from casadi_hands.problem.inertia import Case, Inertial, body_inertials, servo_cases
 
 if TYPE_CHECKING:
     from casadi_hands.problem.hand import Finger, Hand, Link
@@ -49,13 +50,16 @@ def hand_urdf(hand: Hand, world: tuple[Sequence[float], Sequence[float]] | None 
         SubElement(fixed, "child", link="palm")
         turn = Rotation.from_quat(orientation, scalar_first=True).as_matrix()
         SubElement(fixed, "origin", xyz=numbers(position), rpy=numbers(_roll_pitch_yaw(turn)))
-    palm = SubElement(robot, "link", name="palm")
-    _add_inertial(palm, palm_inertial(hand))
+    palm, inertials, cases = SubElement(robot, "link", name="palm"), body_inertials(hand), servo_cases(hand)
+    _add_inertial(palm, inertials["palm"])
     middle = np.array([0.0, 0.0, -hand.palm_thickness / 2])
     for role in ("visual", "collision"):
         _add_shape(palm, role, _cylinder(hand.palm_radius, hand.palm_thickness), middle, (0.0, 0.0, 0.0), PALM_COLOR)
     for i, finger in enumerate(hand.fingers):
-        _add_finger(robot, hand, i, finger)
+        _add_finger(robot, hand, i, finger, inertials)
+    for link in robot.findall("link"):
+        for case in cases.get(link.get("name", ""), ()):
+            _add_case(link, case)
     for name in hand.joint_names:
         _add_transmission(robot, name)
     return document(robot)
@@ -92,7 +96,7 @@ def _robot(name: str) -> Element:
     return robot
 
 
-def _add_finger(robot: Element, hand: Hand, i: int, finger: Finger) -> None:
+def _add_finger(robot: Element, hand: Hand, i: int, finger: Finger, inertials: Mapping[str, Inertial]) -> None:
     """Add one finger's joints and links; `i` is its place in the hand."""
     parent, origin = "palm", np.asarray(finger.base)
     for j, link in enumerate(finger.links):
@@ -111,7 +115,7 @@ def _add_finger(robot: Element, hand: Hand, i: int, finger: Finger) -> None:
             velocity=number(hand.velocity),
         )
         body = SubElement(robot, "link", name=name)
-        _add_inertial(body, link_inertial(link, hand.density))
+        _add_inertial(body, inertials[name])
         solid = Solid("capsule", np.zeros(3), np.array([0.0, 0.0, link.length]), link.radius)
         _add_solid(body, solid, finger_color(i), joint_color(i))
         parent, origin = name, np.array([0.0, 0.0, link.length])
@@ -120,6 +124,12 @@ def _add_finger(robot: Element, hand: Hand, i: int, finger: Finger) -> None:
 def _bend(link: Link) -> str:
     """URDF's angles of how a link is bent from the one before."""
     return numbers(_roll_pitch_yaw(link.turn.as_matrix())) if any(link.bend) else "0 0 0"
+
+
+def _add_case(link: Element, case: Case) -> None:
+    """Add a servo's case, which is looked at and does not collide: at its joint it is in the links that it turns."""
+    turn = _roll_pitch_yaw(case.turn)
+    _add_shape(link, "visual", Element("box", size=numbers(case.size)), case.center, turn, SERVO_COLOR)
 
 
 def _add_transmission(robot: Element, joint: str) -> None:

@@ -57,6 +57,7 @@ class Hand:
         effort: torque limit of every joint, N·m.
         velocity: speed limit of every joint, rad/s.
         density: of links and palm, kg/m³, from which masses and inertias follow.
+        servo: in every joint, by its name in `task.servos`; None where motors are behind the palm.
     """
 
     palm_radius: float
@@ -67,6 +68,7 @@ class Hand:
     effort: float
     velocity: float
     density: float
+    servo: str | None = None
 
     @property
     def joint_names(self) -> tuple[str, ...]:

@@ -6,11 +6,12 @@ task names no damping it is critical, the links beyond the joint moving along, s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import sqrt
 from typing import TYPE_CHECKING
 
-from casadi_hands.problem.inertia import link_inertial
+from casadi_hands.problem.inertia import Inertial, body_inertials
 
 if TYPE_CHECKING:
     from casadi_hands.problem.hand import Finger, Hand
@@ -41,19 +42,21 @@ def joint_motors(task: Task, hand: Hand) -> tuple[Motor, ...]:
         task: names the actuator.
         hand: whose links the motors move.
     """
+    inertials = body_inertials(hand)
     return tuple(
-        _motor(task.actuator, finger, j, hand.density) for finger in hand.fingers for j in range(len(finger.links))
+        _motor(task.actuator, finger, j, [inertials[f"finger{i}_link{k}"] for k in range(len(finger.links))])
+        for i, finger in enumerate(hand.fingers)
+        for j in range(len(finger.links))
     )
 
 
-def _motor(actuator: Actuator, finger: Finger, joint: int, density: float) -> Motor:
-    """The motor of one joint."""
+def _motor(actuator: Actuator, finger: Finger, joint: int, bodies: Sequence[Inertial]) -> Motor:
+    """The motor of one joint of a finger whose links have these mass properties."""
     armature = actuator.stiffness / _FREQUENCY**2
     if actuator.damping is not None:
         return Motor(actuator.stiffness, actuator.damping, armature)
     reach, links = 0.0, 0.0
-    for link in finger.links[joint:]:
-        body = link_inertial(link, density)
-        links += body.inertia[0, 0] + body.mass * (reach + link.length / 2) ** 2
+    for link, body in zip(finger.links[joint:], bodies[joint:], strict=True):
+        links += max(body.inertia[0, 0], body.inertia[1, 1]) + body.mass * (reach + body.center[2]) ** 2
         reach += link.length
     return Motor(actuator.stiffness, 2 * sqrt(actuator.stiffness * (armature + links)), armature)

@@ -181,6 +181,7 @@ def hand_of(
         effort=actuator.torque or max(_RESERVE * effort, _LEAST * model.units.torque),
         velocity=actuator.speed or max(_RESERVE * speed, _LEAST),
         density=task.hand.density,
+        servo=task.hand.drive.servo,
     )
 
 

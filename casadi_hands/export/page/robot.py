@@ -17,9 +17,10 @@ class Shape:
     Attributes:
         link: the link that carries it.
         placement: (4, 4) pose in the link's frame.
-        radius: m.
+        radius: m; of a box that of the ball about it.
         length: of a cylinder, m, along its z axis; None for a sphere.
         color: RGB in 0..1, as exported.
+        sides: (3,) of a box, m; None for others.
     """
 
     link: str
@@ -27,6 +28,7 @@ class Shape:
     radius: float
     length: float | None
     color: tuple[float, float, float]
+    sides: tuple[float, float, float] | None = None
 
     @property
     def reach(self) -> float:
@@ -79,6 +81,11 @@ class Robot:
         frame = self._model.frames[item.parentFrame]
         placement = np.array((frame.placement.inverse() * item.placement).homogeneous)
         red, green, blue = (float(part) for part in item.meshColor[:3])
+        half_sides = getattr(item.geometry, "halfSide", None)
+        if half_sides is not None:
+            x, y, z = (2 * float(side) for side in half_sides)
+            ball = float(np.linalg.norm(half_sides))
+            return Shape(str(frame.name), placement, ball, None, (red, green, blue), (x, y, z))
         half_length = getattr(item.geometry, "halfLength", None)
         length = None if half_length is None else 2 * float(half_length)
         return Shape(str(frame.name), placement, float(item.geometry.radius), length, (red, green, blue))

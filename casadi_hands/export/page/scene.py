@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from meshcat.commands import SetAnimation
 from meshcat.geometry import (
+    Box,
     Cylinder,
     Line,
     LineBasicMaterial,
@@ -199,7 +200,10 @@ def _draw_arrow(node: Any, color: Color, radius: float) -> None:
 
 def _draw_shape(node: Any, shape: Shape, material: Any, layer: int = 0) -> None:
     """Draw a primitive where its link carries it."""
-    if shape.length is None:
+    if shape.sides is not None:
+        node.set_object(LayeredMesh(Box(shape.sides), material, layer))
+        node.set_transform(shape.placement)
+    elif shape.length is None:
         node.set_object(LayeredMesh(FineSphere(shape.radius), material, layer))
         node.set_transform(shape.placement)
     else:
