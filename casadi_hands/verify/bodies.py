@@ -8,6 +8,7 @@ from functools import cached_property
 import coal
 import numpy as np
 
+from casadi_hands.verify.box import Box
 from casadi_hands.verify.shapes import Capsule, Cylinder, HalfSpace, Shape
 
 _REQUEST = coal.DistanceRequest()
@@ -24,6 +25,7 @@ class Body:
         center_of_mass: (3,) m, body frame.
         inertia: (3, 3) kg·m², about the centre of mass, axes of the body frame.
         shapes: the collision geometry, whose union is the body.
+        cases: of servos that it holds, which are seen and do not collide: they are in the links that they turn.
     """
 
     name: str
@@ -31,6 +33,7 @@ class Body:
     center_of_mass: np.ndarray
     inertia: np.ndarray
     shapes: tuple[Shape, ...]
+    cases: tuple[Box, ...] = ()
 
     @property
     def capsules(self) -> tuple[Capsule, ...]:

@@ -197,6 +197,7 @@ def result(task: Task, hand: Hand, samples: int) -> dict[str, Any]:
             "effort": hand.effort,
             "velocity": hand.velocity,
             "density": hand.density,
+            **({"servo": hand.servo} if hand.servo else {}),
         },
         "degrees_of_freedom": hand.degrees_of_freedom,
         "samples": samples,

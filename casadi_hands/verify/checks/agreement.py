@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.verify.bodies import Body, swept_inertial
+from casadi_hands.verify.checks.servos import with_servos
 from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.reading.stored import as_array, entry, same
 from casadi_hands.verify.shapes import FORMS, Capsule, Cylinder, Shape
@@ -223,11 +224,12 @@ def _mass_problems(
 ) -> list[str]:
     """Return where a body's mass properties are not those of its solid at the task's density."""
     mass, inertia = swept_inertial(slices, float(middle[2]), float(folder.task.hand.density))
+    due, servos = with_servos(folder, body, mass, middle, inertia), " and its servos" if body.cases else ""
     problems = []
-    if not same(body.mass, mass, 1e-6):
-        problems.append(f"{who}: {body.mass:.4g} kg is not its volume times the task's density")
-    if np.linalg.norm(body.center_of_mass - middle) > 1e-6 * folder.length:
-        problems.append(f"{who}: its centre of mass in hand.urdf is not in its middle")
-    if not same(body.inertia, inertia):
-        problems.append(f"{who}: its inertia in hand.urdf is not that of its solid")
+    if not same(body.mass, due.mass, 1e-6):
+        problems.append(f"{who}: {body.mass:.4g} kg is not its volume times the task's density{servos}")
+    if np.linalg.norm(body.center_of_mass - due.center_of_mass) > 1e-6 * folder.length:
+        problems.append(f"{who}: its centre of mass in hand.urdf is not in its middle{servos and ' with its servos'}")
+    if not same(body.inertia, due.inertia):
+        problems.append(f"{who}: its inertia in hand.urdf is not that of its solid{servos}")
     return problems

@@ -8,6 +8,7 @@ from casadi_hands.verify.checks.commands import command_problems
 from casadi_hands.verify.checks.motion import motion_problems
 from casadi_hands.verify.checks.palm import palm_problems
 from casadi_hands.verify.checks.scene import scene_problems
+from casadi_hands.verify.checks.servos import servo_problems
 from casadi_hands.verify.checks.table import table_problems
 from casadi_hands.verify.checks.trust import task_problems
 from casadi_hands.verify.figures.disturbances import external_problems
@@ -31,6 +32,7 @@ def structure_problems(folder: Folder, path: Trajectory) -> list[str]:
         *object_problems(folder),
         *hand_problems(folder),
         *hand_task_problems(folder, path),
+        *servo_problems(folder),
         *palm_problems(folder),
         *record_problems(folder),
         *command_problems(folder),

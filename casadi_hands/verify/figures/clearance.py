@@ -25,6 +25,24 @@ def body_pairs(folder: Folder) -> list[tuple[Body, Body]]:
     return pairs
 
 
+def servo_pairs(folder: Folder) -> list[tuple[Body, Body, str, str]]:
+    """Return every pair of a servo's case and a body, or another's case, that must not overlap, and how to call both.
+
+    A case may be in the link that holds it and in the one that it turns. It goes by the name of what it moves with.
+    """
+    cases = []
+    for holder in folder.links.values():
+        for case in holder.cases:
+            turned = [j for j in folder.joints.values() if j.parent == holder.name]
+            joint = min(turned, key=lambda j: float(np.linalg.norm(j.position - case.center)), default=None)
+            if joint is not None:
+                body = Body(holder.name, 0.0, np.zeros(3), np.zeros((3, 3)), (case,))
+                cases.append((body, {holder.name, joint.child}, f"the servo of joint {joint.name}"))
+    others = [folder.object, *folder.links.values(), *([folder.ground] if folder.ground else [])]
+    pairs = [(case, body, who, "") for case, own, who in cases for body in others if body.name not in own]
+    return pairs + [(one, other, who, whose) for (one, _, who), (other, _, whose) in combinations(cases, 2)]
+
+
 def _neighbours(first: str, second: str) -> bool:
     if not {"object", "palm"}.isdisjoint((first, second)):
         return False
@@ -36,13 +54,14 @@ def penetration_figure(folder: Folder, path: Trajectory) -> Figure:
     """Return the deepest overlap of any two bodies at dense times, m; zero when none overlap."""
     worst = (0.0, "no two bodies overlap")
     depths = np.zeros(len(folder.motion.time) - 1)
-    for first, second in body_pairs(folder):
+    loose, held = [(*pair, "", "") for pair in body_pairs(folder)], servo_pairs(folder)
+    for first, second, one, other in (*loose, *held):
         for i in range(0, len(path.time), DENSITY // 4):
             depth = -body_distance(first, path.at(first.name, i), second, path.at(second.name, i))
             k = path.interval[i]
             depths[k] = np.fmax(depths[k], depth)
             if not depth <= worst[0]:
-                names = f"{folder.call(first.name)} and {folder.call(second.name)}"
+                names = f"{one or folder.call(first.name)} and {other or folder.call(second.name)}"
                 worst = worse(worst, (depth, f"{names} overlap by {{value}} at {path.time[i]:.3g} s"))
     return Figure("penetration", worst[0], folder.task.limits.penetration, "m", worst[1], by_interval=depths)
 

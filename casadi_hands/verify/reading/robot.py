@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from casadi_hands.errors import DesignError
 from casadi_hands.verify.bodies import Body, joined
+from casadi_hands.verify.box import Box
 from casadi_hands.verify.reading.markup import called, name_of, number, numbers, only, positive, read_xml, strangers
 from casadi_hands.verify.shapes import Capsule, Cylinder
 
@@ -58,7 +59,7 @@ class Robot:
 
 
 def read_robot(path: Path) -> Robot:
-    """Read a URDF made of spheres, cylinders and revolute joints.
+    """Read a URDF made of spheres, cylinders and revolute joints; boxes that are only seen are cases of servos.
 
     A cylinder with a sphere of its radius at either end is read as the capsule they form.
 
@@ -152,6 +153,7 @@ def _placement(path: Path, element: Element) -> np.ndarray:
 def _read_link(path: Path, name: str, link: Element) -> tuple[Body, list[str]]:
     strange = list(strangers(link, "inertial visual collision", "name"))
     found: dict[str, tuple[list[Capsule], list[Cylinder]]] = {}
+    cases: list[Box] = []
     for role in ("collision", "visual"):
         spheres: list[Capsule] = []
         cylinders: list[Cylinder] = []
@@ -159,11 +161,24 @@ def _read_link(path: Path, name: str, link: Element) -> tuple[Body, list[str]]:
             strange += strangers(element, "origin geometry material")
             for color in element.iter("color"):
                 numbers(path, color, "rgba", 4)
+            if role == "visual" and element.find("geometry/box") is not None:
+                cases.append(_read_case(path, name, element))
+                continue
             _read_shape(path, name, element, spheres, cylinders)
         found[role] = spheres, cylinders
     if _rows(*found["collision"]) != _rows(*found["visual"]):
         strange.append(f"link {name} looks other than it collides: its visual geometry is not its collision geometry")
-    return Body(name, *_inertial(path, name, link), joined(*found["collision"])), strange
+    return Body(name, *_inertial(path, name, link), joined(*found["collision"]), tuple(cases)), strange
+
+
+def _read_case(path: Path, name: str, element: Element) -> Box:
+    placement, geometry = _placement(path, element), only(path, element, "geometry")
+    if geometry is None or len(geometry) != 1:
+        raise DesignError(f"{path}: link {name}: its visual geometry is not one shape")
+    sides = numbers(path, geometry[0], "size", 3)
+    if sides.min() <= 0.0:
+        raise DesignError(f"{path}: link {name}: a side of its box is {sides.min():g} m, not above zero")
+    return Box(sides, placement[:3, 3], placement[:3, :3])
 
 
 def _read_shape(path: Path, name: str, element: Element, spheres: list[Capsule], cylinders: list[Cylinder]) -> None:
