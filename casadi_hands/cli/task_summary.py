@@ -82,6 +82,8 @@ def _links(task: Task) -> str:
     lower, upper = hand.joint_limits
     most = [f"{value:g} {unit}" for value, unit in ((motor.torque, "N·m"), (motor.speed, "rad/s")) if value]
     motors = f"motors of {motor.stiffness:g} N·m/rad, {'at most ' + ' and '.join(most) if most else 'without limits'}"
+    if hand.drive.servo:
+        motors = f"servos {hand.drive.servo}, {motors}"
     sizes = f"radius {1e3 * hand.link_radius:.4g} mm, {low:.4g} to {high:.4g} mm long"
     return f"{sizes}; joints {lower:g} to {upper:g} deg; {motors}"
 

@@ -18,6 +18,8 @@ from casadi_hands.problem.loads import Load, hardest_load, usual_force_limit
 from casadi_hands.problem.model import Model, palm_from_world
 from casadi_hands.task import Task
 from casadi_hands.task.obstacles import depth_in_palm
+from casadi_hands.task.servos import SERVOS
+from casadi_hands.verify.figures.wrench import LEAST_LEVER
 
 Array = NDArray[np.float64]
 
@@ -30,7 +32,7 @@ def impossibilities(task: Task, model: Model) -> list[Reason]:
         model: the same, nondimensional.
     """
     places = [] if task.palm.may_move else [*_behind(task, model), *_beyond_reach(task, model), *_at_palm(task, model)]
-    return [*places, *_too_weak(task, model)]
+    return [*places, *_too_weak(task, model), *_weak_motors(task, model)]
 
 
 def _in_palm(task: Task, model: Model) -> Iterator[tuple[float, Array, Array]]:
@@ -114,6 +116,31 @@ def _too_weak(task: Task, model: Model) -> Iterator[Reason]:
     )
     advice = f"hand.contact_force: {usual_force_limit(model):g}, its default here, more friction or more fingers"
     yield Reason(what, advice, root=True)
+
+
+def _weak_motors(task: Task, model: Model) -> Iterator[Reason]:
+    """The motors are too weak for the least contact forces, even with the shortest levers that count as actuated."""
+    given = task.actuator.torque
+    if given is None:
+        return
+    # Of a force, all but `unsupplied_force` must be actuated with levers of LEAST_LEVER or more; so together a finger's
+    # torques are that lever times it at least, and the largest of n is a share 1/√n of that.
+    shared, borne = math.sqrt(task.search.max_joints), task.limits.unsupplied_force
+    load = hardest_load(model, borne + model.torque_limit * shared / LEAST_LEVER)
+    if load is None or load.contact >= model.contacts:
+        return
+    least = (load.least - borne) * LEAST_LEVER / shared * model.units.torque
+    servo = task.hand.drive.servo
+    motors, limit = (f"servos {servo}", "hold") if servo else ("motors", "give")
+    what = (
+        f"contact '{model.contact_table[load.contact].name}' must bear at least {load.least:.3g} weights "
+        f"({load.least * model.units.force:.3g} N) at {moment(model.schedule, load.time)} to withstand "
+        f"{_acting(model, load)}, which takes {least:.3g} N·m of some joint with the shortest levers that count, and "
+        f"{motors} {limit} {given:.3g} N·m (actuator.torque)"
+    )
+    stronger = [name for name, other in SERVOS.items() if other.continuous >= least] if servo else []
+    advice = f"a stronger servo ({', '.join(stronger)})" if stronger else "stronger motors (actuator.torque)"
+    yield Reason(what, f"{advice}, a lighter object, more friction or more fingers", root=True)
 
 
 def _acting(model: Model, load: Load) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -117,3 +118,20 @@ def test_a_limit_of_contact_forces_that_the_task_s_torque_exceeds() -> None:
     assert "hand.contact_force: 82, its default here" in text
     assert told(more=push + f"hand: {{contact_force: {1.01 * least}}}") == []
     assert told(more=push) == []
+
+
+def test_motors_that_are_too_weak_with_the_shortest_levers() -> None:
+    # As above, 40 N each; of which two joints with levers of 5 % of 30 mm share the torque evenly at best.
+    push = "gravity: [0, 0, 0]\nperturbations: [{from: 1, to: 1.5, torque: [0, 0, 1.2]}]\nsearch: {max_joints: 2}\n"
+    servo = "hand: {drive: {servo: SG90}}\n"
+    least = (40 - 0.02 * WEIGHT) * 0.05 * 0.03 / 2**0.5
+    (text,) = told(more=push + servo)
+    assert re.search(r" takes 0\.042\d N·m of some joint .* and servos SG90 hold 0\.0352 N·m", text)
+    assert text.endswith(
+        "; try a stronger servo (XL330-M077, XL330-M288, XC330-M288, STS3215), a lighter object, more friction or more "
+        "fingers"
+    )
+    # The friction cones of the bound are circumscribed, so it is half a percent short.
+    assert told(more=push + servo + f"actuator: {{torque: {1.001 * least}}}\n") == []
+    (text,) = told(more=push + f"actuator: {{torque: {0.99 * least}}}\n")
+    assert "and motors give 0.042 N·m (actuator.torque); try stronger motors (actuator.torque), " in text
