@@ -100,7 +100,7 @@ def servo_cases(hand: Hand) -> dict[str, tuple[Case, ...]]:
         center = np.array(finger.base)
         for j, link in enumerate(finger.links):
             body = f"finger{i}_link{j - 1}" if j else "palm"
-            case = Case(np.array(servo.size), center, _along(np.array(link.axis)), servo.mass)
+            case = Case(np.array(servo.size), center, _along(link.turn.apply(link.axis)), servo.mass)
             held[body] = (*held.get(body, ()), case)
             center = np.array([0.0, 0.0, link.length])
     return held
