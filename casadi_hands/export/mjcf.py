@@ -186,6 +186,8 @@ def _add_hand(world: Element, task: Task, hand: Hand, motion: Motion, motors: tu
         friction=friction,
         rgba=numbers((*PALM_COLOR, 1.0)),
     )
+    for k, ball in enumerate(hand.palm_balls):
+        _add_solid(palm, {"name": f"palm_ball{k}", "friction": friction}, ball, PALM_COLOR)
     remaining = iter(motors)
     for i, finger in enumerate(hand.fingers):
         names = [f"finger{i}_joint{j}" for j in range(len(finger.links))]
@@ -230,14 +232,8 @@ def _add_finger(
             armature=number(motor.armature),
         )
         _add_inertial(body, inertials[name])
-        tip = np.array([0.0, 0.0, link.length])
-        _add_solid(
-            body,
-            {"name": name, "friction": friction},
-            Solid("capsule", np.zeros(3), tip, link.radius),
-            finger_color(i),
-        )
-        parent, origin = body, tip
+        _add_solid(body, {"name": name, "friction": friction}, link.solid, finger_color(i))
+        parent, origin = body, link.solid.end
 
 
 def _add_inertial(body: Element, inertial: Inertial) -> None:

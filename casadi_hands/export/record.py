@@ -88,7 +88,7 @@ def hand_from_record(record: dict[str, Any]) -> Hand | None:
                     name=str(finger["name"]),
                     base=_vector(finger["base"]),
                     links=tuple(
-                        Link(float(link["length"]), float(link["radius"]), _vector(link["axis"]), _bend(link))
+                        Link(float(link["length"]), float(link["radius"]), _vector(link["axis"]), *_begun(link))
                         for link in finger["links"]
                     ),
                 )
@@ -114,7 +114,13 @@ def _hand(hand: Hand) -> dict[str, Any]:
                 "name": finger.name,
                 "base": finger.base,
                 "links": [
-                    {"length": link.length, "radius": link.radius, "axis": link.axis, "bend": link.bend}
+                    {
+                        "length": link.length,
+                        "radius": link.radius,
+                        "axis": link.axis,
+                        "bend": link.bend,
+                        "hinge": link.hinge,
+                    }
                     for link in finger.links
                 ],
             }
@@ -148,10 +154,10 @@ def rotation_quaternion(vector: np.ndarray) -> np.ndarray:
     return np.array([np.cos(angle / 2), *(np.sinc(angle / (2 * np.pi)) / 2 * np.asarray(vector))])
 
 
-def _bend(link: Mapping[str, Any]) -> tuple[float, float]:
-    """A link's bend, rad; earlier folders tell none, and have none."""
+def _begun(link: Mapping[str, Any]) -> tuple[tuple[float, float], float]:
+    """A link's bend, rad, and hinge, m; earlier folders tell none, and have none."""
     x, y = (float(value) for value in link.get("bend", (0.0, 0.0)))
-    return x, y
+    return (x, y), float(link.get("hinge", 0.0))
 
 
 def _vector(values: Any) -> tuple[float, float, float]:

@@ -55,6 +55,8 @@ def hand_urdf(hand: Hand, world: tuple[Sequence[float], Sequence[float]] | None 
     middle = np.array([0.0, 0.0, -hand.palm_thickness / 2])
     for role in ("visual", "collision"):
         _add_shape(palm, role, _cylinder(hand.palm_radius, hand.palm_thickness), middle, (0.0, 0.0, 0.0), PALM_COLOR)
+    for ball in hand.palm_balls:
+        _add_solid(palm, ball, PALM_COLOR, PALM_COLOR)
     for i, finger in enumerate(hand.fingers):
         _add_finger(robot, hand, i, finger, inertials)
     for link in robot.findall("link"):
@@ -116,8 +118,7 @@ def _add_finger(robot: Element, hand: Hand, i: int, finger: Finger, inertials: M
         )
         body = SubElement(robot, "link", name=name)
         _add_inertial(body, inertials[name])
-        solid = Solid("capsule", np.zeros(3), np.array([0.0, 0.0, link.length]), link.radius)
-        _add_solid(body, solid, finger_color(i), joint_color(i))
+        _add_solid(body, link.solid, finger_color(i), joint_color(i))
         parent, origin = name, np.array([0.0, 0.0, link.length])
 
 

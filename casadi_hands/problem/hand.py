@@ -4,30 +4,42 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 from scipy.spatial.transform import Rotation
+
+from casadi_hands.geometry.bodies import Solid
 
 
 @dataclass(frozen=True)
 class Link:
-    """One finger segment: a capsule along its frame's z axis, from the joint to ``(0, 0, length)``.
+    """One finger segment: a capsule along its frame's z axis, from ``(0, 0, hinge)`` to ``(0, 0, length)``.
+
+    The joint turns in the round end of the body before; a finger's first one in a ball on the palm.
 
     Attributes:
-        length: length of the capsule's axis, m.
+        length: from its joint to the next one or the tip, m.
         radius: radius of the capsule, m.
         axis: (3,) unit vector of the joint at the segment's start, in the link's frame.
         bend: (2,) how the link's frame is turned from its parent's, the palm's for the first, at zero angle: rotation
             vector about the parent's x and y axes, rad.
+        hinge: from its joint to where the capsule's axis begins, m; 0 where it shares a ball with the body before.
     """
 
     length: float
     radius: float
     axis: tuple[float, float, float]
     bend: tuple[float, float] = (0.0, 0.0)
+    hinge: float = 0.0
 
     @property
     def turn(self) -> Rotation:
         """From its parent's frame to its own at zero angle."""
         return Rotation.from_rotvec([*self.bend, 0.0])
+
+    @property
+    def solid(self) -> Solid:
+        """Its body in its own frame."""
+        return Solid("capsule", np.array([0.0, 0.0, self.hinge]), np.array([0.0, 0.0, self.length]), self.radius)
 
 
 @dataclass(frozen=True)
@@ -74,6 +86,12 @@ class Hand:
     def joint_names(self) -> tuple[str, ...]:
         """Names of the joints, in the order of the motion's angles."""
         return tuple(f"finger{i}_joint{j}" for i, finger in enumerate(self.fingers) for j in range(len(finger.links)))
+
+    @property
+    def palm_balls(self) -> tuple[Solid, ...]:
+        """The balls on the palm, in its frame, in which first joints turn; none where links share theirs."""
+        hinged = [(np.array(finger.base), finger.links[0].radius) for finger in self.fingers if finger.links[0].hinge]
+        return tuple(Solid("sphere", base, base, radius) for base, radius in hinged)
 
     @property
     def degrees_of_freedom(self) -> int:

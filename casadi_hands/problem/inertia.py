@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 from typing import TYPE_CHECKING
 
@@ -11,6 +11,7 @@ import numpy as np
 from casadi_hands.task.servos import SERVOS
 
 if TYPE_CHECKING:
+    from casadi_hands.geometry.bodies import Solid
     from casadi_hands.problem.hand import Hand, Link
 
 _LEVEL = 1e-6  # of a unit vector, what no direction can be read off
@@ -52,15 +53,23 @@ def capsule_inertial(length: float, radius: float, density: float) -> Inertial:
 
 def link_inertial(link: Link, density: float) -> Inertial:
     """Mass properties of a finger segment in its link frame; `density` in kg/m³."""
-    return capsule_inertial(link.length, link.radius, density)
+    body = capsule_inertial(link.length - link.hinge, link.radius, density)
+    return replace(body, center=body.center + np.array([0.0, 0.0, link.hinge]))
 
 
 def palm_inertial(hand: Hand) -> Inertial:
-    """Mass properties of the palm's disc, which reaches from z = -thickness to z = 0 of the palm frame."""
+    """Mass properties of the palm: a disc from z = -thickness to z = 0 of its frame, and the balls of first joints."""
     mass = hand.density * pi * hand.palm_radius**2 * hand.palm_thickness
     across = mass * (hand.palm_radius**2 / 4 + hand.palm_thickness**2 / 12)
     center = np.array([0.0, 0.0, -hand.palm_thickness / 2])
-    return Inertial(mass, center, np.diag([across, across, mass * hand.palm_radius**2 / 2]))
+    disc = Inertial(mass, center, np.diag([across, across, mass * hand.palm_radius**2 / 2]))
+    return joined(disc, *(ball_inertial(ball, hand.density) for ball in hand.palm_balls))
+
+
+def ball_inertial(ball: Solid, density: float) -> Inertial:
+    """Mass properties of a solid ball; `density` in kg/m³."""
+    mass = density * 4 / 3 * pi * ball.radius**3
+    return Inertial(mass, ball.start, 2 / 5 * mass * ball.radius**2 * np.eye(3))
 
 
 @dataclass(frozen=True)

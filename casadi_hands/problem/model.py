@@ -60,6 +60,7 @@ class Model:
         link_radius: of all links.
         bend: largest of a link at zero angle, rad.
         axis_cosines: least and largest cosine of a joint's axis and the links beside it.
+        hinge: from a joint to where the body of its link begins; 0 where links begin in a ball that they share.
         link_length: shortest and longest link.
         joint_limits: lower and upper, rad.
         torque_limit: of a joint in m·g·length, or inf.
@@ -95,6 +96,7 @@ class Model:
     link_radius: float
     bend: float
     axis_cosines: tuple[float, float]
+    hinge: float
     link_length: tuple[float, float]
     joint_limits: tuple[float, float]
     torque_limit: float

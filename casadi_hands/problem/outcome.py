@@ -51,7 +51,7 @@ def whole_hand_motion(model: Model, result: WholeHand) -> Motion:
     links = ["none"] * model.contacts + (["ground"] if model.ground is not None else [])
     for i, (finger, contact) in enumerate(zip(result.fingers, result.contacts, strict=True)):
         links[contact] = f"finger{i}_link{finger.joints - 1}"
-        link = Capsule(np.zeros(3), np.array([0, 0, finger.lengths[-1]]), model.link_radius)
+        link = Capsule(np.array([0, 0, model.hinge]), np.array([0, 0, finger.lengths[-1]]), model.link_radius)
         origins, rotations = link_frames(finger, model.link_radius, result.angles[i])
         from_origin = in_palm(model, result, point[:, contact]) - origins[:, -1]
         local = np.einsum("sji,sj->si", rotations[:, -1], from_origin)

@@ -79,6 +79,7 @@ def build_model(task: Task) -> Model:
         tool=None if not task.draws else round_off(np.asarray(task.tool) / length),
         scenarios=_scenarios(task, schedule, units),
         link_radius=round_off(task.hand.link_radius / length),
+        hinge=round_off(task.hand.hinge_length / length),
         link_length=(round_off(task.hand.link_length[0] / length), round_off(task.hand.link_length[1] / length)),
         joint_limits=(math.radians(low), math.radians(high)),
         bend=math.radians(task.hand.bend),
@@ -166,7 +167,13 @@ def hand_of(
     built = []
     for finger, contact in zip(fingers, contacts, strict=True):
         links = tuple(
-            Link(float(part * length), model.link_radius * length, _triple(a / np.linalg.norm(a)), (b[0], b[1]))
+            Link(
+                float(part * length),
+                model.link_radius * length,
+                _triple(a / np.linalg.norm(a)),
+                (b[0], b[1]),
+                task.hand.hinge_length,
+            )
             for part, a, b in zip(finger.lengths, finger.axis_vectors, finger.bends.tolist(), strict=True)
         )
         base = _triple(np.append(finger.base, STAND * model.link_radius) * length)

@@ -96,6 +96,7 @@ _QUANTITIES = {
     # Fingers.
     "link_radius": Quantity("", "length"),
     "radius": Quantity("of the links", "length"),
+    "hinge": Quantity("from a joint to where the body of its link begins", "length"),
     "shortest": Quantity("link that is allowed", "length"),
     "longest": Quantity("link that is allowed", "length"),
     "lowest": Quantity("joint angle that is allowed", "rad"),

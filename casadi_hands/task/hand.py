@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import Field, field_validator
+from pydantic import Field, ValidationInfo, field_validator
 
 from casadi_hands.task.fields import NonNegative, Number, Pair, Positive, Section, Vector, follows, refuse
 from casadi_hands.task.material import DEFAULT_MATERIAL, MATERIALS, SAFETY, Material
@@ -15,6 +15,24 @@ USUAL_STIFFNESS = 1.0
 error times its gain, 400/128 a pulse of 1/4096 turn as delivered, reaches the most it gives, 885: at 0.43 rad, so
 1.2 N·m/rad, and more with its gain turned up. A printed finger of 5 mm radius and 50 mm length (2.5 GPa) bends like a
 spring of 74 N·m/rad at its root, and takes next to nothing off that."""
+
+
+SHORTEST_HINGE = 2.1
+"""Of a link's radius: with less, links that turn by 107° are in each other."""
+SHORTEST_LINK = 3.0
+"""Of a link's radius: the default of the shortest link, so that a fingertip has room beside its hinge."""
+
+
+def usual_hinge(radius: float, length: Any) -> float:
+    """The default of ``hinge_length``, m: none where links may be shorter than a hinge.
+
+    Args:
+        radius: of links, m.
+        length: shortest and longest link as given.
+    """
+    shortest = length[0] if isinstance(length, list | tuple) and length else 0.0
+    room = isinstance(shortest, float | int) and shortest > SHORTEST_HINGE * radius
+    return SHORTEST_HINGE * radius if room else 0.0
 
 
 class FingerSpec(Section):
@@ -84,9 +102,14 @@ class HandSpec(Section):
     link_length: Pair = Field(
         description="Shortest and longest link, m.",
         json_schema_extra={
-            "default": "[2 × link_radius, palm.radius + the farthest contact from the palm's centre over the goals]; "
-            "with servos at least 2 × the radius of their ball"
+            "default": f"[{SHORTEST_LINK:g} × link_radius, palm.radius + the farthest contact from the palm's centre over "
+            "the goals]; with servos at least 2 × the radius of their ball"
         },
+    )
+    hinge_length: NonNegative = Field(
+        description="Distance from a joint to where the next link's body begins, m, so that no two links are in each "
+        "other. 0 lets them share a ball.",
+        json_schema_extra={"default": f"{SHORTEST_HINGE} × link_radius; 0 where links may be shorter"},
     )
     joint_limits: Pair = Field(default=(-90.0, 90.0), description="Lower and upper limit of every joint, degrees.")
     bend: Annotated[NonNegative, Field(le=120)] = Field(
@@ -128,6 +151,17 @@ class HandSpec(Section):
     def _lengths_in_order(cls, value: Pair) -> Pair:
         if not 0 < value[0] <= value[1]:
             raise refuse("[min, max] with 0 < min <= max")
+        return value
+
+    @field_validator("hinge_length")
+    @classmethod
+    def _room_for_a_hinge(cls, value: float, info: ValidationInfo) -> float:
+        radius, length = info.data.get("link_radius"), info.data.get("link_length")
+        if value and radius and length and not SHORTEST_HINGE * radius * (1 - 1e-9) <= value < length[0]:
+            raise refuse(
+                f"0, or at least {SHORTEST_HINGE} × link_radius ({SHORTEST_HINGE * radius:.4g}) and less than the "
+                f"shortest link ({length[0]:.4g})"
+            )
         return value
 
     @field_validator("joint_limits")

@@ -9,7 +9,16 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from casadi_hands.motion import nearest_exponential
 from casadi_hands.task.fields import Positive, Section, Vector, Whole, fill, follows, refuse
-from casadi_hands.task.hand import Actuator, FingerSpec, Fingertip, Ground, HandSpec, rubber_torsion
+from casadi_hands.task.hand import (
+    SHORTEST_LINK,
+    Actuator,
+    FingerSpec,
+    Fingertip,
+    Ground,
+    HandSpec,
+    rubber_torsion,
+    usual_hinge,
+)
 from casadi_hands.task.limits import USUAL_DEFLECTION, Limits, usual_replay_position
 from casadi_hands.task.material import hinge_loads
 from casadi_hands.task.motion import Goal, Perturbation
@@ -95,15 +104,18 @@ class Task(Section):
         body, palm, fingers, goals = (info.data.get(name) for name in ("object", "palm", "fingers", "motion"))
         clearance = USUAL_CLEARANCE * body.characteristic_length if body else 1.0
         value = fill(value, link_radius=0.13 * palm.radius if palm else 1.0, clearance=clearance)
-        if not isinstance(value, dict) or "link_length" in value:
+        if not isinstance(value, dict):
             return value
-        length = (1.0, 1.0)
         radius = value["link_radius"]
-        if palm and fingers and goals and isinstance(radius, float | int):
+        plain = isinstance(radius, float | int)
+        if "link_length" in value:
+            return fill(value, hinge_length=usual_hinge(radius, value["link_length"]) if plain else 0.0)
+        length = (1.0, 1.0)
+        if palm and fingers and goals and plain:
             reach = palm.radius + _farthest_contact(palm, fingers, goals, info.data.get("tool"))
-            shortest = 2.0 * max(radius, servo_reach(value.get("drive")))
+            shortest = max(SHORTEST_LINK * radius, 2.0 * servo_reach(value.get("drive")))
             length = (shortest, max(shortest, reach))
-        return {**value, "link_length": length}
+        return fill({**value, "link_length": length}, hinge_length=usual_hinge(radius, length) if plain else 0.0)
 
     @field_validator("actuator", mode="before")
     @classmethod

@@ -15,8 +15,8 @@ from casadi_hands.geometry.bodies.capsule import Segment
 from casadi_hands.geometry.pairs import core_distance
 
 _ROUNDING = 1e-3  # half the width of the spline's transition, lengths
-HINGE = 2.0
-"""Link radii that a hinge takes of either link: beyond, neighbours are clear of each other."""
+FOLD = -0.3
+"""Cosine of the sharpest turn from a link to the next: there the next one's body, `SHORTEST_HINGE` off, is clear."""
 
 COLLISION = Term(
     "collision",
@@ -73,9 +73,8 @@ def links_and_links(ends: list[tuple[SX, SX]], others: list[tuple[SX, SX]], radi
 
 
 def links_of_one(ends: list[tuple[SX, SX]], radius: SX) -> SX:
-    """Distances between links of one finger; of neighbours as balls on their axes, ``HINGE`` radii off their joint."""
+    """Distances between links of one finger; of neighbours how far they are from the sharpest fold, times a radius."""
     pairs = [(ends[i], ends[j]) for i in range(len(ends)) for j in range(i + 2, len(ends))]
     along = [(end - start) / norm(end - start, _ROUNDING) for start, end in ends]
-    folds = [HINGE * radius * norm(a + b, _ROUNDING) for a, b in itertools.pairwise(along)]
-    axes = [segment_distance(*a, *b) for a, b in pairs]
-    return ca.vertcat(SX.zeros(0, 1), *axes, *folds) - 2 * radius
+    folds = [radius * (ca.dot(a, b) - FOLD) for a, b in itertools.pairwise(along)]
+    return ca.vertcat(SX.zeros(0, 1), *[segment_distance(*a, *b) - 2 * radius for a, b in pairs], *folds)

@@ -101,7 +101,7 @@ class Declaration:
 
     def _declare_parameters(self) -> None:
         problem, structure, count = self.problem, self.structure, self.knots
-        widths = {"reference": 4, "gravity": 3, "inertial": 1, "inertia": 9, "inverse": 9, "radius": 1}
+        widths = {"reference": 4, "gravity": 3, "inertial": 1, "inertia": 9, "inverse": 9, "radius": 1, "hinge": 1}
         widths |= {"palm_radius": 1, "ground_height": 1, "friction": 1}
         widths |= {"bodies": width_of(structure.model.kinds)}
         if structure.model.torsion:
@@ -152,7 +152,7 @@ class Declaration:
 
     def scene(self, contact: int, knots: Knots) -> dict[str, Parameter]:
         """What places object and palm for a contact at some knots."""
-        names = ("reference", "palm_position", "palm_quaternion", "radius")
+        names = ("reference", "palm_position", "palm_quaternion", "radius", "hinge")
         return self.at(knots, *names) | self.of(contact, knots, "body")
 
     def bind(

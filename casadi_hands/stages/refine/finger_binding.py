@@ -103,7 +103,7 @@ def bind_rolling(of: Declaration, i: int) -> None:
         point=point.combine(halves),
         angles=of.angles[i].combine(halves),
         force=force.combine(halves),
-        **of.at(start, "reference", "radius"),
+        **of.at(start, "reference", "radius", "hinge"),
         **of.between(start),
         **of.of(c, start, "frames", "body"),
     )

@@ -65,6 +65,7 @@ class Scene:
     palm_quaternion: SX
     body: Surface
     radius: SX
+    hinge: SX
 
     @classmethod
     def declare(cls, kernel: Kernel, kind: type[Body], place: int | None = None) -> Scene:
@@ -78,7 +79,7 @@ class Scene:
             declared(n, k) for n, k in (("reference", 4), ("palm_position", 3), ("palm_quaternion", 4))
         )
         body = kind.surface(declared("body", kind.width))
-        return cls(reference, position, quaternion, body, declared("radius", 1))
+        return cls(reference, position, quaternion, body, declared("radius", 1), declared("hinge", 1))
 
     def touch(self, pose: SX, point: SX, angles: SX, symbols: FingerSymbols) -> Touch:
         """See a contact point (3,), object frame, from the object and from a finger's last link."""
@@ -89,7 +90,7 @@ class Scene:
         skeleton = symbols.placed(angles, self.radius)
         on_link = ca.mtimes(skeleton.tip_rotation.T, in_palm - skeleton.origins[:, -1])
         off_object, normal = self.body.distance_and_normal(point, ROUNDING)
-        axis = Segment(SX.zeros(3, 1), ca.vertcat(0, 0, symbols.lengths[-1]))
+        axis = Segment(ca.vertcat(0, 0, self.hinge), ca.vertcat(0, 0, symbols.lengths[-1]))
         from_axis = axis.offset(on_link)
         from_link = ca.mtimes(rotation.T, ca.mtimes(skeleton.tip_rotation, from_axis))
         off_link = from_link + self.radius * normal

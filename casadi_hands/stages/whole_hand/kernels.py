@@ -36,7 +36,9 @@ def touch(joints: int, moves: bool) -> Kernel:
     palm, palm_before = Palm(kernel, moves), Palm(kernel, moves, before=True)
     symbols = given_morphology(kernel, joints)
     reference = kernel.parameter("reference", 4)
-    radius, friction, sharpness, step = (kernel.parameter(n) for n in ("link_radius", "friction", "sharpness", "step"))
+    radius, hinge, friction, sharpness, step = (
+        kernel.parameter(n) for n in ("link_radius", "hinge", "friction", "sharpness", "step")
+    )
     position, quaternion = placed(pose, reference)
     rotation = rotation_matrix(quaternion)
     in_palm = palm.sees(position + ca.mtimes(rotation, point))
@@ -44,7 +46,7 @@ def touch(joints: int, moves: bool) -> Kernel:
     last = skeleton.origins[:, -1]
     on_link = ca.mtimes(skeleton.tip_rotation.T, in_palm - last)
     here = symbols.placed(angles, radius, on_link)
-    link = Surface(Segment(SX.zeros(3, 1), ca.vertcat(0, 0, symbols.lengths[-1])), radius)
+    link = Surface(Segment(ca.vertcat(0, 0, hinge), ca.vertcat(0, 0, symbols.lengths[-1])), radius)
     projection, normal = link.project(on_link)
     force_in_palm = palm.turned(ca.mtimes(rotation, force))
     kernel.cost(contact.CONTACT_ON_FINGER, contact.off_surface(force, invariant, on_link, projection))

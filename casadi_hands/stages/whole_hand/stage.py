@@ -56,7 +56,7 @@ class WholeHandStage:
         if palm_moves:
             palm = problem.variable("palm", (keyframes, 6), -FARTHEST_PALM, FARTHEST_PALM)
         bind_object(problem, model, side, palm)
-        for name in ("link_radius", "lowest", "highest", "margin"):
+        for name in ("link_radius", "hinge", "lowest", "highest", "margin"):
             problem.parameter(name, (1, 1))
         problem.parameter("bodies", (1, width_of(model.kinds)))
         for name, width in (("palm_position", 3), ("palm_quaternion", 4)):
@@ -98,7 +98,7 @@ class WholeHandStage:
             **moved_before,
             **given,
             **shape,
-            **problem.given("reference", "link_radius", "friction", "sharpness", "step"),
+            **problem.given("reference", "link_radius", "hinge", "friction", "sharpness", "step"),
         )
         limits = problem.given("lowest", "highest", "step")
         problem.bind(kernels.move(joints[c]), angles=(before, now, after), **shape, **limits)
@@ -172,6 +172,7 @@ class WholeHandStage:
         values = object_parameters(model)
         values |= {
             "link_radius": model.link_radius,
+            "hinge": model.hinge,
             "lowest": model.joint_limits[0],
             "highest": model.joint_limits[1],
             "margin": MARGIN,

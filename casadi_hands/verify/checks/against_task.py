@@ -77,9 +77,10 @@ def _size_problems(folder: Folder) -> list[str]:
         if name == "palm":
             continue
         for capsule in body.capsules:
-            if not shortest * (1 - ROUNDED) <= capsule.length <= longest * (1 + ROUNDED):
+            length = float(capsule.end[2])
+            if not shortest * (1 - ROUNDED) <= length <= longest * (1 + ROUNDED):
                 allowed = f"{1e3 * shortest:.4g} to {1e3 * longest:.4g} mm"
-                problems.append(f"{who} is {1e3 * capsule.length:.4g} mm long; the task allows {allowed}")
+                problems.append(f"{who} is {1e3 * length:.4g} mm long; the task allows {allowed}")
             due = task.hand.link_radius
             if abs(capsule.radius - due) > ROUNDED * due:
                 problems.append(f"{who} has a radius of {1e3 * capsule.radius:.4g} mm, the task {1e3 * due:.4g} mm")

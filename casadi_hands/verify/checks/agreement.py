@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.verify.bodies import Body, swept_inertial
-from casadi_hands.verify.checks.servos import with_servos
+from casadi_hands.verify.checks.servos import put_together
 from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.reading.stored import as_array, entry, same
 from casadi_hands.verify.shapes import FORMS, Capsule, Cylinder, Shape
@@ -165,9 +165,13 @@ def _palm_body_problems(folder: Folder, body: Body, stated: Any) -> list[str]:
     for name, due in (("radius", palm.radius), ("thickness", palm.thickness)):
         if not same(entry(stated, name), due):
             problems.append(f"palm: result.json says {_brief(entry(stated, name))} m of {name}, the task {due:.6g} m")
-    disc = body.shapes[0] if len(body.shapes) == 1 else None
-    if not isinstance(disc, Cylinder):
+    discs = [shape for shape in body.shapes if isinstance(shape, Cylinder)]
+    if len(discs) != 1:
         return [*problems, "the palm: hand.urdf has not the one disc that it is"]
+    disc, balls = discs[0], [shape for shape in body.shapes if shape is not discs[0]]
+    due_balls = _palm_balls(folder)
+    if len(balls) != len(due_balls) or not all(any(due.agrees(ball) for ball in balls) for due in due_balls):
+        problems.append("the palm: its balls in hand.urdf are not those in which result.json has first joints turn")
     if not (same(disc.radius, palm.radius) and same(disc.length, palm.thickness)):
         problems.append(
             f"the palm: hand.urdf has a disc of {1e3 * disc.radius:.4g} mm × {1e3 * disc.length:.4g} mm,"
@@ -178,7 +182,15 @@ def _palm_body_problems(folder: Folder, body: Body, stated: Any) -> list[str]:
     middle = np.array([0.0, 0.0, -0.5 * palm.thickness])
     rim = float(palm.radius)
     flat = [(-float(palm.thickness), 0.0, rim, rim)]
-    return problems + _mass_problems(folder, "the palm", body, flat, middle)
+    return problems + _mass_problems(folder, "the palm", body, flat, middle, due_balls)
+
+
+def _palm_balls(folder: Folder) -> tuple[Capsule, ...]:
+    """The balls in which first joints turn, where the task's links do not begin in their joints."""
+    if not folder.task.hand.hinge_length:
+        return ()
+    at = [joint.position for joint in folder.joints.values() if joint.parent == "palm"]
+    return tuple(Capsule(base, base, float(folder.task.hand.link_radius)) for base in at)
 
 
 def _link_problems(folder: Folder, name: str, stated: Any, parent: str, origin: Any) -> list[str]:
@@ -191,12 +203,16 @@ def _link_problems(folder: Folder, name: str, stated: Any, parent: str, origin: 
         return [f"{who}: result.json states no length and radius"]
     problems = []
     capsule, tip = body.capsules[0], np.array([0.0, 0.0, float(length)])
+    hinge = as_array(entry(stated, "hinge"), ()) if "hinge" in stated else np.zeros(())
+    if hinge is None or not same(hinge, folder.task.hand.hinge_length):
+        return [f"{who}: it does not begin a hinge's length from its joint, as the task has it"]
+    root = np.array([0.0, 0.0, float(hinge)])
     if len(body.shapes) > 1:
         problems.append(f"{who}: hand.urdf has more than the one capsule that it is")
-    if not capsule.agrees(Capsule(np.zeros(3), tip, float(radius))):
+    if not capsule.agrees(Capsule(root, tip, float(radius))):
         problems.append(
             f"{who}: hand.urdf has a capsule of {1e3 * capsule.length:.4g} mm × {1e3 * capsule.radius:.4g} mm,"
-            f" result.json one of {1e3 * length:.4g} mm × {1e3 * radius:.4g} mm from its joint on"
+            f" result.json one of {1e3 * (length - hinge):.4g} mm × {1e3 * radius:.4g} mm from its hinge on"
         )
     if joint.child != name or joint.parent != parent:
         problems.append(f"{who}: in hand.urdf it hangs on {folder.call(joint.parent)}, not on {folder.call(parent)}")
@@ -214,17 +230,22 @@ def _link_problems(folder: Folder, name: str, stated: Any, parent: str, origin: 
         problems.append(f"{who}: result.json states no bend of two numbers")
     elif (Rotation.from_rotvec([*bend, 0.0]).inv() * Rotation.from_euler("xyz", joint.turn)).magnitude() > 1e-6:
         problems.append(f"{who}: its frame in hand.urdf is not turned at zero angle as result.json has it bent")
-    span, round_ = float(length), float(radius)
-    slices = [(-round_, 0.0, 0.0, round_), (0.0, span, round_, round_), (span, span + round_, round_, 0.0)]
-    return problems + _mass_problems(folder, who, body, slices, tip / 2)
+    low, high, round_ = float(hinge), float(length), float(radius)
+    slices = [(low - round_, low, 0.0, round_), (low, high, round_, round_), (high, high + round_, round_, 0.0)]
+    return problems + _mass_problems(folder, who, body, slices, (root + tip) / 2)
 
 
 def _mass_problems(
-    folder: Folder, who: str, body: Body, slices: list[tuple[float, float, float, float]], middle: np.ndarray
+    folder: Folder,
+    who: str,
+    body: Body,
+    slices: list[tuple[float, float, float, float]],
+    middle: np.ndarray,
+    balls: tuple[Capsule, ...] = (),
 ) -> list[str]:
     """Return where a body's mass properties are not those of its solid at the task's density."""
     mass, inertia = swept_inertial(slices, float(middle[2]), float(folder.task.hand.density))
-    due, servos = with_servos(folder, body, mass, middle, inertia), " and its servos" if body.cases else ""
+    due, servos = put_together(folder, body, mass, middle, inertia, balls), " and its servos" if body.cases else ""
     problems = []
     if not same(body.mass, due.mass, 1e-6):
         problems.append(f"{who}: {body.mass:.4g} kg is not its volume times the task's density{servos}")

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from casadi_hands.verify.bodies import Body
 from casadi_hands.verify.reading.folder import Folder
+from casadi_hands.verify.shapes import Capsule
 
 
 def servo_problems(folder: Folder) -> list[str]:
@@ -38,8 +39,10 @@ def servo_problems(folder: Folder) -> list[str]:
     return problems
 
 
-def with_servos(folder: Folder, body: Body, mass: float, center: np.ndarray, inertia: np.ndarray) -> Body:
-    """Return a body with the mass properties of a solid and of the servos that it holds.
+def put_together(
+    folder: Folder, body: Body, mass: float, center: np.ndarray, inertia: np.ndarray, balls: tuple[Capsule, ...] = ()
+) -> Body:
+    """Return a body with the mass properties of a solid, of balls on it and of the servos that it holds.
 
     Args:
         folder: the design.
@@ -47,10 +50,14 @@ def with_servos(folder: Folder, body: Body, mass: float, center: np.ndarray, ine
         mass: of the solid, kg.
         center: (3,) m, its centre of mass.
         inertia: (3, 3) kg·m², about that.
+        balls: as dense as the task says.
     """
     servo = folder.task.hand.drive.motor
     # Second moments ∫ x xᵀ dm about the frame's origin: of parts they add.
     parts = [(mass, center, 0.5 * np.trace(inertia) * np.eye(3) - inertia)]
+    for ball in balls:
+        weighs = folder.task.hand.density * 4 / 3 * np.pi * ball.radius**3
+        parts.append((weighs, ball.start, weighs * ball.radius**2 / 5 * np.eye(3)))
     for case in body.cases if servo else ():
         assert servo is not None
         parts.append((servo.mass, case.center, case.turn @ np.diag(servo.mass * case.sides**2 / 12) @ case.turn.T))

@@ -15,11 +15,12 @@ from casadi_hands.verify.trajectory import DENSITY, Trajectory
 def body_pairs(folder: Folder) -> list[tuple[Body, Body]]:
     """Return every pair of bodies that must not overlap.
 
-    Neighbours in a chain share a joint and so touch. The palm and a finger's first link share one, too, but that link
-    stands on the palm's face, clear of it. Palm and ground may not touch either.
+    Where the task's links begin in their joints, neighbours in a chain share a ball there and so touch; else they do
+    not. Palm and ground may not touch either.
     """
     bodies = [folder.object, *folder.links.values()]
-    pairs = [pair for pair in combinations(bodies, 2) if not _neighbours(pair[0].name, pair[1].name)]
+    share = not folder.task.hand.hinge_length
+    pairs = [pair for pair in combinations(bodies, 2) if not (share and _neighbours(pair[0].name, pair[1].name))]
     if folder.ground is not None:
         pairs += [(folder.ground, body) for body in bodies]
     return pairs
