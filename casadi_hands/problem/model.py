@@ -70,6 +70,7 @@ class Model:
         stiffness: of a joint in m·g·length/rad.
         torsion: radius of the fingertips' torsional friction, lengths; 0 for hard points.
         sliding: lengths that a finger's contact may be planned to slide from touch to lift; 0 where it must roll.
+        servo: radius of the ball about each joint that holds its servo; 0 where motors are behind the palm.
         regrasp: planned, or None where fingers stay where they touch.
         own_terms: costs and constraints that a person adds to those of the stages.
     """
@@ -106,6 +107,7 @@ class Model:
     stiffness: float
     torsion: float
     sliding: float = 0.0
+    servo: float = 0.0
     regrasp: Regrasp | None = None
     own_terms: tuple[OwnTerm, ...] = ()
 

@@ -89,6 +89,7 @@ def build_model(task: Task) -> Model:
         stiffness=round_off(actuator.stiffness / units.torque),
         torsion=round_off(task.fingertip.torsion / length),
         sliding=_sliding(task.limits.slip, length),
+        servo=round_off(task.hand.drive.motor.reach / length) if task.hand.drive.motor else 0.0,
         force_limit=given or USUAL_FORCE,
         clearance=round_off(task.hand.clearance / length),
     )

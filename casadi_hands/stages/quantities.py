@@ -97,6 +97,7 @@ _QUANTITIES = {
     "link_radius": Quantity("", "length"),
     "radius": Quantity("of the links", "length"),
     "hinge": Quantity("from a joint to where the body of its link begins", "length"),
+    "servo_radius": Quantity("of the ball about a joint that holds its servo", "length"),
     "shortest": Quantity("link that is allowed", "length"),
     "longest": Quantity("link that is allowed", "length"),
     "lowest": Quantity("joint angle that is allowed", "rad"),

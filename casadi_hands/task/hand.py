@@ -102,8 +102,8 @@ class HandSpec(Section):
     link_length: Pair = Field(
         description="Shortest and longest link, m.",
         json_schema_extra={
-            "default": f"[{SHORTEST_LINK:g} × link_radius, palm.radius + the farthest contact from the palm's centre over "
-            "the goals]; with servos at least 2 × the radius of their ball"
+            "default": f"[{SHORTEST_LINK:g} × link_radius, palm.radius + the farthest contact from the palm's centre "
+            "over the goals]; with servos at least 2 × the radius of their ball"
         },
     )
     hinge_length: NonNegative = Field(

@@ -13,10 +13,12 @@ from casadi_hands.geometry import norm, penalty_spline, point_disc_distance, seg
 from casadi_hands.geometry.bodies import Surface
 from casadi_hands.geometry.bodies.capsule import Segment
 from casadi_hands.geometry.pairs import core_distance
+from casadi_hands.geometry.segments import point_segment_distance
 
 _ROUNDING = 1e-3  # half the width of the spline's transition, lengths
 FOLD = -0.3
 """Cosine of the sharpest turn from a link to the next: there the next one's body, `SHORTEST_HINGE` off, is clear."""
+_CROSSING = 1e-4  # value of distances that vanish, lengths
 
 COLLISION = Term(
     "collision",
@@ -78,3 +80,47 @@ def links_of_one(ends: list[tuple[SX, SX]], radius: SX) -> SX:
     along = [(end - start) / norm(end - start, _ROUNDING) for start, end in ends]
     folds = [radius * (ca.dot(a, b) - FOLD) for a, b in itertools.pairwise(along)]
     return ca.vertcat(SX.zeros(0, 1), *[segment_distance(*a, *b) - 2 * radius for a, b in pairs], *folds)
+
+
+# Servos: balls about the joints, which are where links begin.
+
+
+def servos_and_rest(
+    ends: list[tuple[SX, SX]],
+    radius: SX,
+    servo: SX,
+    palm_radius: SX,
+    bodies: Sequence[Surface],
+    up: SX | None,
+    height: SX,
+) -> SX:
+    """Distances between a finger's servos and all that they are not in, but for other fingers.
+
+    Those of the object's bodies; of the palm, but for the first joint, which stands on it; of links that do not meet at
+    the joint; of servos that are no neighbours, since neighbours are a link's length apart; and of the ground.
+
+    Args:
+        ends: both ends (3,) of each link's axis.
+        radius: of the links.
+        servo: radius of the ball about a joint that holds its servo.
+        palm_radius: of the disc.
+        bodies: whose union the object is.
+        up: (3,) the ground's normal, whose points p have up·p = height; None without a ground.
+        height: of it.
+    """
+    found = [body.distance_and_normal(at, _CROSSING)[0] - servo for at, _ in ends for body in bodies]
+    found += [point_disc_distance(at, palm_radius) - servo for at, _ in ends[1:]]
+    for j, (at, _) in enumerate(ends):
+        links = [link for i, link in enumerate(ends) if i not in (j - 1, j)]
+        found += [point_segment_distance(*link, at) - radius - servo for link in links]
+        found += [norm(at - there, _CROSSING) - 2 * servo for there, _ in ends[j + 2 :]]
+    if up is not None:
+        found += [ca.dot(up, at) - height - servo for at, _ in ends]
+    return ca.vertcat(*found)
+
+
+def servos_and_finger(ends: list[tuple[SX, SX]], others: list[tuple[SX, SX]], radius: SX, servo: SX) -> SX:
+    """Distances between servos of two fingers, and of each one's from the other one's links."""
+    links = [point_segment_distance(*link, at) - radius - servo for at, _ in ends for link in others]
+    links += [point_segment_distance(*link, at) - radius - servo for at, _ in others for link in ends]
+    return ca.vertcat(*links, *[norm(at - there, _CROSSING) - 2 * servo for at, _ in ends for there, _ in others])

@@ -93,6 +93,13 @@ BUILD: dict[str, Callable[[], object]] = {
     "refine": lambda: refine(everything()[1], (0, 1, 2), (2, 2, 3)),
     "refine, one finger": lambda: refine(everything()[1], (1,), (3,)),
     "refine, sliding": lambda: refine(replace(everything()[1], sliding=0.4), (0, 1, 2), (2, 2, 3)),
+    "synthesis, servos": lambda: SynthesisStage(
+        target_of(replace(everything()[1], servo=0.4), made_up_floating(everything()[1])), (0, 1), (2, 2)
+    ),
+    "whole hand, servos": lambda: WholeHandStage(
+        replace(everything()[1], servo=0.4), (0, 1, 2), (2, 2, 3), palm_moves=True
+    ),
+    "refine, servos": lambda: refine(replace(everything()[1], servo=0.4), (0, 1, 2), (2, 2, 3)),
     "refine, drawing": lambda: refine(drawing()[1], (0, 1), (3, 3)),
     "refine, one joint": lambda: refine(drawing()[1], (1, 0), (1, 1)),
 }

@@ -104,6 +104,8 @@ class Declaration:
         widths = {"reference": 4, "gravity": 3, "inertial": 1, "inertia": 9, "inverse": 9, "radius": 1, "hinge": 1}
         widths |= {"palm_radius": 1, "ground_height": 1, "friction": 1}
         widths |= {"bodies": width_of(structure.model.kinds)}
+        if structure.model.servo:
+            widths |= {"servo_radius": 1}
         if structure.model.torsion:
             widths |= {"torsion_radius": 1, "sliding_friction": 1, "spin_scale": 1}
         if structure.model.sliding:

@@ -223,6 +223,8 @@ class RefineValues:
             "wanted_pose": np.hstack([wanted.position, wanted.vector]),
         }
         values |= self.proximity.idle
+        if model.servo:
+            values["servo_radius"] = model.servo
         if model.torsion:
             values |= {"torsion_radius": model.torsion, "sliding_friction": model.friction}
             values["spin_scale"] = self._spin_scale

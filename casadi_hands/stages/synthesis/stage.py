@@ -12,9 +12,17 @@ from numpy.typing import NDArray
 from casadi_hands.geometry.bodies import width_of
 from casadi_hands.kinematics.morphology import FingerSeed
 from casadi_hands.motion import linear
-from casadi_hands.nlp import Options, Parameter, Problem, Rows, Solution, Solver
+from casadi_hands.nlp import Kernel, Options, Parameter, Problem, Rows, Solution, Solver
 from casadi_hands.stages.buildable import buildable, buildable_bounds
-from casadi_hands.stages.synthesis.kernels import build, collide, follow, keep_apart, travel
+from casadi_hands.stages.synthesis.kernels import (
+    build,
+    collide,
+    follow,
+    keep_apart,
+    keep_servos_apart,
+    keep_servos_clear,
+    travel,
+)
 from casadi_hands.stages.synthesis.target import Target
 
 Array = NDArray[np.float64]
@@ -85,6 +93,8 @@ class SynthesisStage:
         samples = len(target.collision_times(BETWEEN))
         for name in ("link_radius", "palm_radius", "shortest", "longest", "lowest", "highest", "margin"):
             problem.parameter(name, (1, 1))
+        if target.model.servo:
+            problem.parameter("servo_radius", (1, 1))
         problem.parameter("bodies", (samples, width_of(target.kinds)))
         problem.parameter("up", (samples, 3))
         problem.parameter("ground", (samples, 1))
@@ -118,13 +128,18 @@ class SynthesisStage:
             kernel, bounds = buildable(n, target.model.hinged, bool(target.bend)), buildable_bounds(target.model)
             problem.bind(kernel, bounds, f"buildable{c}", axes=rows["axes"], bends=rows["bends"], frames=frames)
         times = target.collision_times(BETWEEN)
-        problem.bind(
-            collide(n, target.kinds),
-            **constant(len(times)),
-            angles=rows["angles"].combine(linear(target.times, times)),
-            frames=frames,
-            **problem.given("link_radius", "palm_radius", "margin", "bodies", "up", "ground"),
-        )
+        around = ("link_radius", "palm_radius", "margin", "bodies", "up", "ground")
+        blocks: list[tuple[Kernel, tuple[str, ...]]] = [(collide(n, target.kinds), around)]
+        if target.model.servo:
+            blocks.append((keep_servos_clear(n, target.kinds), (*around, "servo_radius")))
+        for kernel, names in blocks:
+            problem.bind(
+                kernel,
+                **constant(len(times)),
+                angles=rows["angles"].combine(linear(target.times, times)),
+                frames=frames,
+                **problem.given(*names),
+            )
         idle = np.flatnonzero(~target.active[1:-1, c]) + 1
         if len(idle):
             three = [rows["angles"].take(idle + offset) for offset in (-1, 0, 1)]
@@ -136,13 +151,18 @@ class SynthesisStage:
         weights = linear(self.target.times, times)
         both = rows, others
         shapes = {name: [r[name].constant(len(times)) for r in both] for name in MORPHOLOGY}
-        self.problem.bind(
-            keep_apart(self.joints[i], self.joints[j]),
-            **shapes,
-            angles=[r["angles"].combine(weights) for r in both],
-            frames=[self.problem[f"frames{self.contacts[k]}"] for k in (i, j)],
-            **self.problem.given("link_radius", "margin"),
-        )
+        joints, names = (self.joints[i], self.joints[j]), ("link_radius", "margin")
+        blocks: list[tuple[Kernel, tuple[str, ...]]] = [(keep_apart(*joints), names)]
+        if self.target.model.servo:
+            blocks.append((keep_servos_apart(*joints), (*names, "servo_radius")))
+        for kernel, given in blocks:
+            self.problem.bind(
+                kernel,
+                **shapes,
+                angles=[r["angles"].combine(weights) for r in both],
+                frames=[self.problem[f"frames{self.contacts[k]}"] for k in (i, j)],
+                **self.problem.given(*given),
+            )
 
     def solve(
         self, seeds: tuple[FingerSeed, ...], weights: Mapping[str, object], options: Options = OPTIONS
@@ -197,6 +217,8 @@ class SynthesisStage:
             "up": up,
             "ground": ground[:, None],
         }
+        if target.model.servo:
+            values["servo_radius"] = target.model.servo
         for contact, seed in zip(self.contacts, seeds, strict=True):
             values[f"frames{contact}"] = seed.frames.transpose(0, 2, 1).reshape(1, -1)
             values[f"target{contact}"] = target.points[:, contact]

@@ -133,6 +133,41 @@ def finger_clearance(joints: int, other_joints: int) -> Kernel:
 
 
 @cache
+def servos(joints: int, kinds: tuple[type[Body], ...], moves: bool) -> Kernel:
+    """One finger's servos against object, palm, ground and the rest of the finger at one sample (eq. 2.20)."""
+    kernel = Kernel("servos_and_rest")
+    pose, angles = kernel.variable("pose", 6), kernel.variable("angles", joints)
+    palm = Palm(kernel, moves)
+    symbols = given_morphology(kernel, joints)
+    reference = kernel.parameter("reference", 4)
+    radius, servo, palm_radius, ground, margin = (
+        kernel.parameter(name) for name in ("link_radius", "servo_radius", "palm_radius", "ground_height", "margin")
+    )
+    bodies = surfaces(kinds, kernel.parameter("bodies", width_of(kinds)))
+    position, quaternion = placed(pose, reference)
+    rotation = rotation_matrix(quaternion)
+    seen = [body.mapped(lambda point: palm.sees(position + ca.mtimes(rotation, point))) for body in bodies]
+    ends = symbols.placed(angles, radius).ends
+    up, height = palm.turned(SX([0, 0, 1])), ground - palm.position[2]
+    apart = clearance.servos_and_rest(ends, radius, servo, palm_radius, seen, up, height)
+    kernel.cost(clearance.COLLISION, clearance.overlap(margin - apart))
+    return kernel
+
+
+@cache
+def servos_of_two(joints: int, other_joints: int) -> Kernel:
+    """The servos of two fingers against each other and each other's links at one sample (eq. 2.20)."""
+    kernel = Kernel("servos_of_two")
+    angles = kernel.variable("angles0", joints, "angles", 0)
+    other_angles = kernel.variable("angles1", other_joints, "angles", 1)
+    first, second = given_morphology(kernel, joints, 0), given_morphology(kernel, other_joints, 1)
+    radius, servo, margin = (kernel.parameter(name) for name in ("link_radius", "servo_radius", "margin"))
+    ends = first.placed(angles, radius).ends, second.placed(other_angles, radius).ends
+    kernel.cost(clearance.COLLISION, clearance.overlap(margin - clearance.servos_and_finger(*ends, radius, servo)))
+    return kernel
+
+
+@cache
 def palm_motion() -> Kernel:
     """A moving palm at one keyframe: acceleration of its offset, and a weak pull to the given motion."""
     kernel = Kernel("palm_motion")

@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 from casadi_hands.geometry.bodies import packed, width_of
 from casadi_hands.kinematics.morphology import FingerSeed
 from casadi_hands.kinematics.numeric import contact_kinematics
-from casadi_hands.nlp import Options, Parameter, Problem, Rows, Solution, Solver
+from casadi_hands.nlp import Kernel, Options, Parameter, Problem, Rows, Solution, Solver
 from casadi_hands.problem.floating_motion import Floating
 from casadi_hands.problem.hand_motion import WholeHand, turned
 from casadi_hands.problem.model import Model, palm_from_world, sampled_points, sizes
@@ -58,6 +58,8 @@ class WholeHandStage:
         bind_object(problem, model, side, palm)
         for name in ("link_radius", "hinge", "lowest", "highest", "margin"):
             problem.parameter(name, (1, 1))
+        if model.servo:
+            problem.parameter("servo_radius", (1, 1))
         problem.parameter("bodies", (1, width_of(model.kinds)))
         for name, width in (("palm_position", 3), ("palm_quaternion", 4)):
             problem.parameter(f"{name}_before", (samples, width), quantity=name, when=-1)
@@ -100,26 +102,29 @@ class WholeHandStage:
             **shape,
             **problem.given("reference", "link_radius", "hinge", "friction", "sharpness", "step"),
         )
+        palm_pose = ("palm_position", "palm_quaternion")
         limits = problem.given("lowest", "highest", "step")
         problem.bind(kernels.move(joints[c]), angles=(before, now, after), **shape, **limits)
-        bodies = ("reference", "link_radius", "palm_radius", "ground_height", "margin", "bodies")
-        problem.bind(
-            kernels.object_clearance(joints[c], model.kinds, self.palm_moves),
-            pose=side.pose[1],
-            angles=now,
-            **moved,
-            **problem.given("palm_position", "palm_quaternion"),
-            **shape,
-            **problem.given(*bodies),
-        )
+        around = ("reference", "link_radius", "palm_radius", "ground_height", "margin", "bodies", *palm_pose)
+        blocks: list[tuple[Kernel, tuple[str, ...]]] = [
+            (kernels.object_clearance(joints[c], model.kinds, self.palm_moves), around)
+        ]
+        if model.servo:
+            blocks.append((kernels.servos(joints[c], model.kinds, self.palm_moves), (*around, "servo_radius")))
+        for kernel, names in blocks:
+            problem.bind(kernel, pose=side.pose[1], angles=now, **moved, **shape, **problem.given(*names))
         for d in self.contacts[: self.contacts.index(c)]:
-            other = self._morphology(d)
-            problem.bind(
-                kernels.finger_clearance(joints[c], joints[d]),
-                angles=(now, angles[d].combine(schedule.spline())),
-                **{name: (shape[name], other[name]) for name in shape},
-                **problem.given("link_radius", "margin"),
-            )
+            other, pair = self._morphology(d), ("link_radius", "margin")
+            blocks = [(kernels.finger_clearance(joints[c], joints[d]), pair)]
+            if model.servo:
+                blocks.append((kernels.servos_of_two(joints[c], joints[d]), (*pair, "servo_radius")))
+            for kernel, names in blocks:
+                problem.bind(
+                    kernel,
+                    angles=(now, angles[d].combine(schedule.spline())),
+                    **{name: (shape[name], other[name]) for name in shape},
+                    **problem.given(*names),
+                )
 
     def _morphology(self, contact: int) -> dict[str, Parameter]:
         return {name: self.problem[f"{name}{contact}"] for name in ("frames", "base", "lengths", "axes", "bends")}
@@ -173,6 +178,7 @@ class WholeHandStage:
         values |= {
             "link_radius": model.link_radius,
             "hinge": model.hinge,
+            **({"servo_radius": model.servo} if model.servo else {}),
             "lowest": model.joint_limits[0],
             "highest": model.joint_limits[1],
             "margin": MARGIN,
