@@ -12,6 +12,7 @@ Color = tuple[float, float, float]
 
 PALM_COLOR = (0.62, 0.65, 0.70)
 OBJECT_COLOR = (0.95, 0.75, 0.30)
+PIN_COLOR: Color = (0.75, 0.75, 0.78)
 SERVO_COLOR = (0.22, 0.23, 0.26)
 GROUND_COLOR = (0.78, 0.80, 0.82)
 _FINGER_COLORS = (

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from casadi_hands.export.markup import (
     OBJECT_COLOR,
     PALM_COLOR,
+    PIN_COLOR,
     SERVO_COLOR,
     Color,
     document,
@@ -119,7 +120,25 @@ def _add_finger(robot: Element, hand: Hand, i: int, finger: Finger, inertials: M
         body = SubElement(robot, "link", name=name)
         _add_inertial(body, inertials[name])
         _add_solid(body, link.solid, finger_color(i), joint_color(i))
+        if link.hinge:
+            _add_hinge(body, link, joint_color(i))
         parent, origin = name, np.array([0.0, 0.0, link.length])
+
+
+def _add_hinge(body: Element, link: Link, color: Color) -> None:
+    """Add a link's tongue, up to its joint, and the pin that it turns on: looked at, but in the body before."""
+    axis = 1.2 * link.radius * np.asarray(link.axis)
+    for start, end, radius, shown in (
+        (np.zeros(3), link.solid.start, 0.6 * link.radius, color),
+        (-axis, axis, 0.25 * link.radius, PIN_COLOR),
+    ):
+        along, length = end - start, float(np.linalg.norm(end - start))
+        _add_shape(body, "visual", _cylinder(radius, length), (start + end) / 2, _pointing(along), shown)
+
+
+def _pointing(axis: np.ndarray) -> tuple[float, float, float]:
+    """URDF's angles of a frame whose z points along an axis (3,)."""
+    return 0.0, float(np.arctan2(np.hypot(axis[0], axis[1]), axis[2])), float(np.arctan2(axis[1], axis[0]))
 
 
 def _bend(link: Link) -> str:
@@ -158,7 +177,7 @@ def _add_solid(link: Element, solid: Solid, color: Color, end_color: Color) -> N
     start, end, radius = solid.start, solid.end, solid.radius
     axis = end - start
     length = float(np.linalg.norm(axis))
-    rotation = (0.0, float(np.arctan2(np.hypot(axis[0], axis[1]), axis[2])), float(np.arctan2(axis[1], axis[0])))
+    rotation = _pointing(axis)
     for role in ("visual", "collision"):
         if solid.kind != "cylinder":
             _add_shape(link, role, _sphere(radius), start, rotation, end_color)

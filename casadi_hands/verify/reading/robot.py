@@ -13,7 +13,7 @@ from casadi_hands.errors import DesignError
 from casadi_hands.verify.bodies import Body, joined
 from casadi_hands.verify.box import Box
 from casadi_hands.verify.reading.markup import called, name_of, number, numbers, only, positive, read_xml, strangers
-from casadi_hands.verify.shapes import Capsule, Cylinder
+from casadi_hands.verify.shapes import Capsule, Cylinder, Shape
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Robot:
 
 
 def read_robot(path: Path) -> Robot:
-    """Read a URDF made of spheres, cylinders and revolute joints; boxes that are only seen are cases of servos.
+    """Read a URDF of spheres, cylinders and revolute joints; boxes only to be seen are servos, thin cylinders hinges.
 
     A cylinder with a sphere of its radius at either end is read as the capsule they form.
 
@@ -166,9 +166,20 @@ def _read_link(path: Path, name: str, link: Element) -> tuple[Body, list[str]]:
                 continue
             _read_shape(path, name, element, spheres, cylinders)
         found[role] = spheres, cylinders
-    if _rows(*found["collision"]) != _rows(*found["visual"]):
+    spheres, cylinders = found["visual"]
+    seen = spheres, [cylinder for cylinder in cylinders if not _in_hinge(cylinder, joined(*found["collision"]))]
+    if _rows(*found["collision"]) != _rows(*seen):
         strange.append(f"link {name} looks other than it collides: its visual geometry is not its collision geometry")
     return Body(name, *_inertial(path, name, link), joined(*found["collision"]), tuple(cases)), strange
+
+
+def _in_hinge(cylinder: Cylinder, body: tuple[Shape, ...]) -> bool:
+    """Whether a cylinder is no farther from the joint than where a link's one capsule begins, and thinner."""
+    capsule = body[0] if len(body) == 1 else None
+    if not isinstance(capsule, Capsule) or cylinder.radius >= capsule.radius:
+        return False
+    length = float(np.linalg.norm(capsule.start)) * (1 + 1e-6)
+    return all(float(np.linalg.norm(end)) <= length for end in (cylinder.start, cylinder.end))
 
 
 def _read_case(path: Path, name: str, element: Element) -> Box:
