@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from casadi_hands.kinematics.morphology import FingerSeed
 from casadi_hands.motion.quaternion import quaternion
 from casadi_hands.nlp import Solution
+from casadi_hands.problem.coupling import Coupling
 
 Array = NDArray[np.float64]
 
@@ -34,6 +35,7 @@ class WholeHand:
         disturbed: (S, C, 3) forces that hold the object on the same path under the task's perturbations; None without.
         torsion: (S, C) moments on the object about its outward normals, over the radius of the torsional friction: m·g;
             None of hard points.
+        coupling: how motors turn the joints; None where each joint has its own.
     """
 
     fingers: tuple[FingerSeed, ...]
@@ -49,6 +51,7 @@ class WholeHand:
     solution: Solution
     disturbed: Array | None = None
     torsion: Array | None = None
+    coupling: Coupling | None = None
 
 
 def turned(start: Array, vector: Array) -> Array:

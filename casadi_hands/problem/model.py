@@ -72,6 +72,8 @@ class Model:
         sliding: lengths that a finger's contact may be planned to slide from touch to lift; 0 where it must roll.
         servo: radius of the ball about each joint that holds its servo; 0 where motors are behind the palm.
         regrasp: planned, or None where fingers stay where they touch.
+        motors: that turn all joints; 0 where each joint has one of its own.
+        ratios: the smallest and the largest size of a joint's ratio to such a motor, where it is not zero.
         own_terms: costs and constraints that a person adds to those of the stages.
     """
 
@@ -109,6 +111,8 @@ class Model:
     sliding: float = 0.0
     servo: float = 0.0
     regrasp: Regrasp | None = None
+    motors: int = 0
+    ratios: tuple[float, float] = (0.1, 2.0)
     own_terms: tuple[OwnTerm, ...] = ()
 
     @property

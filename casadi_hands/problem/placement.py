@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from casadi_hands.geometry.contact_points import rounded_normals
 from casadi_hands.kinematics.numeric import link_frames
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
@@ -53,6 +54,22 @@ def contact_jacobians(model: Model, motion: WholeHand, finger: int) -> Array:
     axes = np.einsum("kjab,jb->kja", rotations, own.axis_vectors)
     contact = in_palm(model, motion, motion.point[:, motion.contacts[finger]])
     return np.ascontiguousarray(np.cross(axes, contact[:, None] - origins).transpose(0, 2, 1))
+
+
+def joint_torques(model: Model, motion: WholeHand) -> Array:
+    """(S, J) with which joints exert the contacts' forces and torsional moments, m·g·length."""
+    found = []
+    for i, (contact, finger) in enumerate(zip(motion.contacts, motion.fingers, strict=True)):
+        force = turned_to_palm(motion, turned_to_world(model, motion, motion.force[:, contact]))
+        torque = np.einsum("sij,si->sj", contact_jacobians(model, motion, i), force)
+        if motion.torsion is not None:
+            normals = rounded_normals(motion.point[:, contact], model.touched[contact])
+            moment = model.torsion * motion.torsion[:, contact, None] * normals
+            moment = turned_to_palm(motion, turned_to_world(model, motion, moment))
+            _, rotations = link_frames(finger, model.link_radius, motion.angles[i])
+            torque += np.einsum("sjab,jb,sa->sj", rotations, finger.axis_vectors, moment)
+        found.append(torque)
+    return np.hstack(found)
 
 
 def forces_of_joint_errors(model: Model, motion: WholeHand, finger: int, error: float) -> Array:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from casadi_hands.geometry.contact_points import on_bodies
 from casadi_hands.motion import Schedule, catmull_rom, continuous, linear, nearest_exponential, zero_order_hold
+from casadi_hands.problem.coupling import Coupling
 from casadi_hands.problem.hand_motion import WholeHand, turned
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.palm_motion import carried_by_palm, goals_seen_from_palm, stands
@@ -78,10 +79,15 @@ def resampled(hand: WholeHand, before: Model, after: Model) -> WholeHand:
         active=hand.active[zero_order_hold(was, now)],
         disturbed=None,
         torsion=None if hand.torsion is None else straight @ hand.torsion,
+        coupling=_on_samples(hand.coupling, between),
     )
     if not moves:
         return smooth
     return on_palm(smooth, between @ position + finer[:, :3], _turned(between @ vectors, finer[:, 3:]))
+
+
+def _on_samples(coupling: Coupling | None, weights: Array) -> Coupling | None:
+    return None if coupling is None else replace(coupling, positions=weights @ coupling.positions)
 
 
 def on_palm(hand: WholeHand, palm_position: Array, palm_quaternion: Array) -> WholeHand:

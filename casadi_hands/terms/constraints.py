@@ -149,6 +149,15 @@ WITHIN_SLIP = Constraint(
     ("slip",),
 )
 
+ON_LINES = Constraint(
+    "on_lines",
+    "q + τ / k = q₀ + C s",
+    "angle",
+    "be turned by so few motors",
+    "more motors (motors), or wider ratios (hand.ratios)",
+    ("coupling",),
+)
+
 # The same under a disturbance.
 DISTURBED_PRESSING = replace(PRESSING, cannot="keep pressing under the perturbation", advice=_DISTURBED, explains=())
 DISTURBED_CONE = replace(CONE, cannot="hold without slipping under the perturbation", advice=_DISTURBED, explains=())

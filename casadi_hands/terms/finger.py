@@ -92,6 +92,9 @@ STAY_DESIGN = Term(
     "length and rad",
     weights={"refine": Weight(5.0, "knot")},
 )
+MOTOR_ACCELERATION = Term(
+    "motor_acceleration", "Acceleration of motors that share joints", "", "rad/s²", weights={"refine": Weight(1e-3, "knot")}
+)
 # No weight but in restorations.
 PROXIMITY = Term(
     "anchor", "Proximal term of a restoration", "", "length, rad and 0.1 m·g", weights={"refine": Weight(0.0, "knot")}

@@ -98,6 +98,17 @@ class Declaration:
                     for name, (size, low, high) in shapes.items()
                 }
             )
+        if model.motors:
+            self._declare_coupling(model.motors)
+
+    def _declare_coupling(self, motors: int) -> None:
+        """Variables of motors that share joints."""
+        structure, variable = self.structure, self.problem.variable
+        self.motors = variable("motors", (self.knots, motors))
+        self.lines: list[dict[str, Rows]] = []
+        for c, n in zip(structure.contacts, structure.joints, strict=True):
+            sizes = {"ratios": n * motors, "offsets": n}
+            self.lines.append({k: variable(f"{k}{c}", (1, w), quantity=k, owner=c) for k, w in sizes.items()})
 
     def _declare_parameters(self) -> None:
         problem, structure, count = self.problem, self.structure, self.knots
@@ -111,6 +122,8 @@ class Declaration:
         if structure.model.sliding:
             widths |= {"sliding_friction": 1, "slide_margin": 1, "slip_scale": 1}
             problem.parameter("cone_friction", (1, 1), quantity="friction")
+        if structure.model.motors:
+            widths |= {"stiffness": 1}
         for name, width in widths.items():
             problem.parameter(name, (1, width))
         problem.parameter("step", (count - 1, 1))

@@ -6,6 +6,7 @@ import numpy as np
 
 from casadi_hands.problem.structure import Structure
 from casadi_hands.stages.own_terms import bind_own, contact_names
+from casadi_hands.stages.refine.coupling import bind as bind_coupling
 from casadi_hands.stages.refine.declaration import Block, Declaration
 from casadi_hands.stages.refine.finger_binding import bind_clearance, bind_contact, bind_pair, bind_rolling, bind_shape
 from casadi_hands.stages.refine.object_binding import bind_ground, bind_object, bind_physics
@@ -33,6 +34,8 @@ class RefineProblem(Declaration):
             bind_ground(self)
         if structure.model.torsion:
             bind_torsion(self)
+        if structure.model.motors:
+            bind_coupling(self)
         if structure.model.sliding:
             bind_sliding(self)
         for i in range(len(structure.contacts)):

@@ -20,7 +20,10 @@ from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.resampling import shortened
 from casadi_hands.problem.structure import Structure
+from casadi_hands.problem.coupling import Coupling
 from casadi_hands.stages.own_terms import own_weights
+from casadi_hands.stages.refine import coupling
+from casadi_hands.stages.refine.declaration import Bounds
 from casadi_hands.stages.refine.inter_knot import pass_through
 from casadi_hands.stages.refine.problem import RefineProblem
 from casadi_hands.stages.refine.result import Refined, Run, Worst
@@ -130,6 +133,9 @@ class RefineStage:
             if runs and runs[-1].what == what and not runs[-1].solution.violation <= ACCEPTED:
                 break
             bounds = always | exact if what == "hard constraints" else always
+            if start.coupling is not None:
+                low, high, lines = self._coupled(what, values, start.coupling)
+                lower, upper, bounds = lower | low, upper | high, bounds | lines
             parameters |= self._weighted(weights) | self._slip_scale(scale) | self._spin_scale(what, sharp)
             solution = self.solver.solve(values, parameters, options, lower, upper, bounds)
             if what == "hard constraints" and not solution.violation <= MET:
@@ -139,6 +145,14 @@ class RefineStage:
             if what != "hard constraints":
                 slips = self._slips(solution)
         return replace(self._result(start, runs, slips or self._slips(solution), used), homotopy=homotopy)
+
+    def _coupled(
+        self, what: str, values: dict[str, NDArray[np.float64]], begun: Coupling
+    ) -> tuple[dict[str, NDArray[np.float64]], dict[str, NDArray[np.float64]], Bounds]:
+        """Bounds of motors and ratios in a step, and how far commands may be off their lines."""
+        now = coupling.result(self.built, values, begun.leaders)
+        low, high = coupling.bounds(self.built, now, self.model.ratios, what == "hard constraints")
+        return low, high, coupling.constraint_bounds(self.built, what)
 
     def _restored(
         self,
@@ -227,6 +241,7 @@ class RefineStage:
             solution=solution,
             disturbed=disturbed,
             torsion=torsion,
+            coupling=start.coupling and coupling.result(self.built, values, start.coupling.leaders),
         )
         worst = self._worst(solution)
         hopeless = what != "hard constraints"

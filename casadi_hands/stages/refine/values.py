@@ -15,6 +15,7 @@ from casadi_hands.problem.model import Model
 from casadi_hands.problem.placement import contact_jacobians, contact_spins
 from casadi_hands.stages.object_motion.values import MOST_TURN, tool_path
 from casadi_hands.stages.own_terms import own_values
+from casadi_hands.stages.refine.coupling import start as coupling_start
 from casadi_hands.stages.refine.declaration import HOLDING
 from casadi_hands.stages.refine.initial_guess import balanced, disturbance_wrenches, rates_and_wrenches
 from casadi_hands.stages.refine.problem import RefineProblem
@@ -55,7 +56,7 @@ class RefineValues:
     """
 
     def __init__(self, built: RefineProblem, model: Model) -> None:
-        self.structure, self.model, self.proximity = built.structure, model, built.proximity
+        self.built, self.structure, self.model, self.proximity = built, built.structure, model, built.proximity
         self.problem, self.disturbed, self.knots = built.problem, built.disturbed, built.knots
         # A contact that touches again bears nothing until it does: its force grows from zero.
         self._active = active = self.structure.active
@@ -173,6 +174,8 @@ class RefineValues:
         for c, finger, angles in zip(self.structure.contacts, motion.fingers, motion.angles, strict=True):
             values |= {f"angles{c}": angles, f"base{c}": finger.base, f"lengths{c}": finger.lengths}
             values |= {f"axes{c}": finger.axes.reshape(1, -1), f"bends{c}": finger.bends.reshape(1, -1)}
+        if motion.coupling is not None:
+            values |= coupling_start(self.built, motion.coupling)
         return values
 
     @property
@@ -228,6 +231,8 @@ class RefineValues:
         if model.torsion:
             values |= {"torsion_radius": model.torsion, "sliding_friction": model.friction}
             values["spin_scale"] = self._spin_scale
+        if model.motors:
+            values["stiffness"] = model.stiffness
         if model.sliding:
             values |= {"sliding_friction": model.friction, "cone_friction": WHOLE * model.friction}
             values |= {"slide_margin": margin.friction, "slip_scale": SLIP_SCALE / model.units.length}
