@@ -33,6 +33,7 @@ _SHAPES: dict[str, tuple[str | int, ...]] = {
     "joint_velocities": ("S", "J"),
     "joint_torques": ("S", "J"),
     "joint_commands": ("S", "J"),
+    "motor_positions": ("S", "N"),
     "contact_moment": ("S", "C", 3),
     "contact_force_disturbed": ("S", "C", 3),
     "external_force_disturbed": ("S", 3),

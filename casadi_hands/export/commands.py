@@ -2,6 +2,8 @@
 
 A joint's set point is ``angle + (torque + damping × velocity) / stiffness``: position actuators (see `motors`) exert
 ``stiffness × (set point − angle) − damping × velocity``, which is the planned torque on the planned motion.
+Where joints share motors, spring and damper are between the joint and what its motors turn, and nothing drags: the
+commands are where the motors turn it, ``angle + torque / stiffness``.
 """
 
 from __future__ import annotations
@@ -31,6 +33,9 @@ def commanded(task: Task, hand: Hand, motion: Motion) -> Motion:
     stiffness = np.array([motor.stiffness for motor in motors])
     damping = np.array([motor.damping for motor in motors])
     velocities, torques = joint_velocities(motion), joint_torques(hand, motion)
+    if hand.drive is not None and motion.motor_positions is not None:
+        commands = hand.drive.commands(motion.motor_positions)
+        return replace(motion, joint_velocities=velocities, joint_torques=torques, joint_commands=commands)
     commands = motion.joint_angles + (torques + damping * velocities) / stiffness
     return replace(motion, joint_velocities=velocities, joint_torques=torques, joint_commands=commands)
 

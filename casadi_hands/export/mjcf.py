@@ -1,4 +1,4 @@
-"""The whole scene as MJCF for MuJoCo: hand on its base, object free, ground, one position actuator a joint.
+"""The whole scene as MJCF for MuJoCo: hand on its base, object free, ground, one position actuator a motor.
 
 Choices a reader of the file should know:
 
@@ -12,6 +12,9 @@ Choices a reader of the file should know:
 - **Motors.** See `casadi_hands.problem.motors`; torque is limited to the hand's effort. The hand carries its own weight
   (``gravcomp``), as a controller that knows its hand does. Targets are not clamped, so that a feed-forward torque can
   be given as an offset of the target (see `casadi_hands.export.commands`).
+- **Shared motors.** Where motors share joints, each is a hinge of its own, ``motor{m}``, with a stiff position actuator.
+  A fixed tendon pulls at every joint, by the joint's spring and damper, to where the motors turn it, and as hard at the
+  motors, by virtual work.
 - **Start.** Bodies stand as at the motion's first sample, whose joint angles are the joints' reference: what loads the
   scene and resets nothing finds no finger in the object.
 - **Collisions.** Neighbours in a chain, the palm and first links among them, do not collide; all else does.
@@ -19,7 +22,7 @@ Choices a reader of the file should know:
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, SubElement
@@ -38,9 +41,10 @@ from casadi_hands.export.markup import (
     number,
     numbers,
 )
+from casadi_hands.export.shared_motors import add_motors
 from casadi_hands.geometry.bodies import Solid
 from casadi_hands.problem.inertia import Inertial, body_inertials
-from casadi_hands.problem.motors import Motor, joint_motors
+from casadi_hands.problem.motors import Motor, joint_motors, shared_motors
 
 if TYPE_CHECKING:
     from casadi_hands.problem.hand import Finger, Hand
@@ -82,7 +86,12 @@ def scene_mjcf(task: Task, hand: Hand, motion: Motion) -> str:
     if moves:
         weld = {"body1": "palm_target", "body2": "palm", "solref": number(2.5 * _TIME_STEP) + " 1"}
         SubElement(SubElement(root, "equality"), "weld", weld)
-    _add_actuators(root, hand, motors)
+    if hand.drive is None:
+        _add_actuators(root, hand.joint_names, motors, hand.effort)
+    else:
+        shared = shared_motors(task, hand)
+        add_motors(world, root, hand, motors, shared)
+        _add_actuators(root, hand.drive.names, shared, hand.drive.effort)
     _add_keyframes(root, task, motion, moves)
     return document(root)
 
@@ -252,10 +261,10 @@ def _add_solid(body: Element, attributes: dict[str, str], solid: Solid, color: C
         SubElement(body, "geom", attributes, fromto=numbers((*solid.start, *solid.end)))
 
 
-def _add_actuators(root: Element, hand: Hand, motors: tuple[Motor, ...]) -> None:
+def _add_actuators(root: Element, joints: Sequence[str], motors: tuple[Motor, ...], effort: float) -> None:
     """Add a position actuator for every joint, named as the joint."""
     actuators = SubElement(root, "actuator")
-    for name, motor in zip(hand.joint_names, motors, strict=True):
+    for name, motor in zip(joints, motors, strict=True):
         SubElement(
             actuators,
             "position",
@@ -264,7 +273,7 @@ def _add_actuators(root: Element, hand: Hand, motors: tuple[Motor, ...]) -> None
             kp=number(motor.stiffness),
             kv=number(motor.damping),
             forcelimited="true",
-            forcerange=numbers((-hand.effort, hand.effort)),
+            forcerange=numbers((-effort, effort)),
         )
 
 
@@ -278,8 +287,9 @@ def _add_keyframes(root: Element, task: Task, motion: Motion, moves: bool) -> No
         base = (*motion.base_position[k], *motion.base_orientation[k]) if moves else ()
         item = (*motion.object_position[k], *motion.object_orientation[k])
         key = {"name": name, "time": number(motion.time[k])}
-        key["qpos"] = numbers((*base, *motion.joint_angles[k], *item))
-        key["ctrl"] = numbers(motion.joint_commands[k])
+        shared = () if motion.motor_positions is None else motion.motor_positions[k]
+        key["qpos"] = numbers((*base, *motion.joint_angles[k], *item, *shared))
+        key["ctrl"] = numbers(motion.joint_commands[k] if motion.motor_positions is None else shared)
         if moves:
             key["mpos"], key["mquat"] = numbers(base[:3]), numbers(base[3:])
         SubElement(parent, "key", key)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from casadi_hands.errors import DesignError
+from casadi_hands.problem.drive import Drive
 from casadi_hands.problem.hand import Finger, Hand, Link
 from casadi_hands.problem.result import Result
 from casadi_hands.task import task_to_yaml
@@ -96,11 +97,23 @@ def hand_from_record(record: dict[str, Any]) -> Hand | None:
             ),
             **{name: float(entry[name]) for name in _HAND_NUMBERS},
             servo=None if entry.get("servo") is None else str(entry["servo"]),
+            drive=_drive_from_record(entry),
         )
     except KeyError as error:
         raise DesignError(f"the hand lacks {error}") from error
     except (TypeError, ValueError) as error:
         raise DesignError(f"the hand cannot be read: {error}") from error
+
+
+def _drive_from_record(entry: dict[str, Any]) -> Drive | None:
+    if "ratios" not in entry:
+        return None
+    return Drive(
+        ratios=tuple(tuple(float(ratio) for ratio in row) for row in entry["ratios"]),
+        offsets=tuple(float(offset) for offset in entry["offsets"]),
+        effort=float(entry["motor_effort"]),
+        velocity=float(entry["motor_velocity"]),
+    )
 
 
 _HAND_NUMBERS = ("joint_lower", "joint_upper", "effort", "velocity", "density")
@@ -128,7 +141,14 @@ def _hand(hand: Hand) -> dict[str, Any]:
         ],
         **{name: getattr(hand, name) for name in _HAND_NUMBERS},
         **({} if hand.servo is None else {"servo": hand.servo}),
+        "motors": hand.motors,
+        **(_drive(hand.drive) if hand.drive else {}),
     }
+
+
+def _drive(drive: Drive) -> dict[str, Any]:
+    numbers = {"motor_effort": drive.effort, "motor_velocity": drive.velocity}
+    return {"ratios": drive.ratios, "offsets": drive.offsets, **numbers}
 
 
 def _shape(shape: Any) -> dict[str, Any]:

@@ -21,6 +21,7 @@ _UNITS = {
     "joint_velocities": "rad/s",
     "joint_torques": "N m",
     "joint_commands": "rad",
+    "motor_positions": "rad",
     "contact_active": "",
     "contact_force": "N",
     "contact_point_object": "m",
@@ -70,6 +71,9 @@ def _columns(motion: Motion) -> Iterator[tuple[str, np.ndarray]]:
         elif name.startswith("joint_"):
             for joint, column in zip(motion.joint_names, values.T, strict=True):
                 yield _title(name, joint), column
+        elif name == "motor_positions":
+            for m, column in enumerate(values.T):
+                yield _title(name, f"motor{m}"), column
         elif name not in of_contacts:
             yield from _components(name, values)
 

@@ -63,8 +63,9 @@ def hand_urdf(hand: Hand, world: tuple[Sequence[float], Sequence[float]] | None 
     for link in robot.findall("link"):
         for case in cases.get(link.get("name", ""), ()):
             _add_case(link, case)
-    for name in hand.joint_names:
-        _add_transmission(robot, name)
+    for j, name in enumerate(hand.joint_names):
+        if hand.drive is None or hand.drive.leader(j) is None:
+            _add_transmission(robot, name)
     return document(robot)
 
 
@@ -117,6 +118,7 @@ def _add_finger(robot: Element, hand: Hand, i: int, finger: Finger, inertials: M
             effort=number(hand.effort),
             velocity=number(hand.velocity),
         )
+        _add_mimic(joint, hand, f"finger{i}_joint{j}")
         body = SubElement(robot, "link", name=name)
         _add_inertial(body, inertials[name])
         _add_solid(body, link.solid, finger_color(i), joint_color(i))
@@ -150,6 +152,15 @@ def _add_case(link: Element, case: Case) -> None:
     """Add a servo's case, which is looked at and does not collide: at its joint it is in the links that it turns."""
     turn = _roll_pitch_yaw(case.turn)
     _add_shape(link, "visual", Element("box", size=numbers(case.size)), case.center, turn, SERVO_COLOR)
+
+
+def _add_mimic(joint: Element, hand: Hand, name: str) -> None:
+    """Say which joint this one follows, where one motor turns both: so do their commands, springs in between."""
+    found = None if hand.drive is None else hand.drive.leader(hand.joint_names.index(name))
+    if found is not None:
+        first, multiplier, offset = found
+        leader = hand.joint_names[first]
+        SubElement(joint, "mimic", joint=leader, multiplier=number(multiplier), offset=number(offset))
 
 
 def _add_transmission(robot: Element, joint: str) -> None:

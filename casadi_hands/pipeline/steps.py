@@ -13,7 +13,7 @@ from casadi_hands.pipeline.record import Record
 from casadi_hands.problem.floating_motion import Floating
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
-from casadi_hands.problem.outcome import floating_motion, whole_hand_motion
+from casadi_hands.problem.outcome import drive_of, floating_motion, whole_hand_motion
 from casadi_hands.problem.si import hand_of, joint_loads
 from casadi_hands.stages.floating.stage import FloatingStage, solve_floating
 from casadi_hands.stages.own_terms import own_weights
@@ -102,4 +102,8 @@ def adopt(record: Record, model: Model, result: WholeHand) -> None:
     """Make a hand and its motion the record's."""
     torque, speed = joint_loads(model, result)
     hand = hand_of(record.task, model, result.fingers, result.contacts, torque, speed)
-    record.update(hand=hand, motion=commanded(record.task, hand, whole_hand_motion(model, result)))
+    motion = whole_hand_motion(model, result)
+    if result.coupling is not None:
+        hand = replace(hand, drive=drive_of(record.task, model, result))
+        motion = replace(motion, motor_positions=result.coupling.positions)
+    record.update(hand=hand, motion=commanded(record.task, hand, motion))

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.geometry.bodies import Solid
+
+if TYPE_CHECKING:
+    from casadi_hands.problem.drive import Drive
 
 
 @dataclass(frozen=True)
@@ -70,6 +74,7 @@ class Hand:
         velocity: speed limit of every joint, rad/s.
         density: of links and palm, kg/m³, from which masses and inertias follow.
         servo: in every joint, by its name in `task.servos`; None where motors are behind the palm.
+        drive: of motors that share the joints; None where every joint has its own.
     """
 
     palm_radius: float
@@ -81,6 +86,12 @@ class Hand:
     velocity: float
     density: float
     servo: str | None = None
+    drive: Drive | None = None
+
+    @property
+    def motors(self) -> int:
+        """Number of motors."""
+        return self.drive.motors if self.drive else self.degrees_of_freedom
 
     @property
     def joint_names(self) -> tuple[str, ...]:

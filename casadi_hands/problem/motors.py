@@ -2,6 +2,9 @@
 
 A motor's own inertia (of rotor and gears, seen at the joint) answers with a natural frequency of 200 rad/s. Where the
 task names no damping it is critical, the links beyond the joint moving along, stretched straight out.
+
+Where joints share motors, the same spring and damper are between each joint and what its motors turn: a drum, a belt,
+a flexure; the inertia is that of the joint's pulley then.
 """
 
 from __future__ import annotations
@@ -18,6 +21,7 @@ if TYPE_CHECKING:
     from casadi_hands.task import Actuator, Task
 
 _FREQUENCY = 200.0  # rad/s, of the motor's inertia on its stiffness
+_STIFFER, _QUICK = 100.0, 500.0  # of motors that share joints: than their springs together; rad/s
 
 
 @dataclass(frozen=True)
@@ -48,6 +52,24 @@ def joint_motors(task: Task, hand: Hand) -> tuple[Motor, ...]:
         for i, finger in enumerate(hand.fingers)
         for j in range(len(finger.links))
     )
+
+
+def shared_motors(task: Task, hand: Hand) -> tuple[Motor, ...]:
+    """The motors that share the joints, each a hundred times as stiff as all springs it pulls at, seen at its shaft.
+
+    They are held at what they are told, with a natural frequency of 500 rad/s, critically damped.
+
+    Args:
+        task: names the joints' stiffness.
+        hand: with a drive.
+    """
+    assert hand.drive is not None
+    motors = []
+    for column in zip(*hand.drive.ratios, strict=True):
+        stiffness = _STIFFER * task.actuator.stiffness * sum(ratio**2 for ratio in column)
+        armature = stiffness / _QUICK**2
+        motors.append(Motor(stiffness, 2 * sqrt(stiffness * armature), armature))
+    return tuple(motors)
 
 
 def _motor(actuator: Actuator, finger: Finger, joint: int, bodies: Sequence[Inertial]) -> Motor:

@@ -1,4 +1,7 @@
-"""The motions that a solve ends with, as they are written: that of the object alone, and that of object and hand."""
+"""The motions that a solve ends with, as they are written: that of the object alone, and that of object and hand.
+
+And the motors that share joints, whose limits follow from the motion.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ from numpy.typing import NDArray
 from casadi_hands.geometry.bodies.capsule import Capsule
 from casadi_hands.geometry.contact_points import on_bodies, rounded_normals
 from casadi_hands.kinematics.numeric import link_frames
+from casadi_hands.problem.drive import Drive
 from casadi_hands.problem.floating_motion import Floating
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model, sampled_points
@@ -18,9 +22,11 @@ from casadi_hands.problem.palm_motion import poses_at
 from casadi_hands.problem.placement import (
     in_palm,
     in_world,
+    joint_torques,
     object_rotation,
 )
-from casadi_hands.problem.si import motion_in_si
+from casadi_hands.problem.si import LEAST, RESERVE, motion_in_si
+from casadi_hands.task import Task
 
 Array = NDArray[np.float64]
 
@@ -81,4 +87,27 @@ def whole_hand_motion(model: Model, result: WholeHand) -> Motion:
         contact_force_disturbed=np.einsum("sij,scj->sci", rotations, result.disturbed[:, touch]) * model.units.force,
         external_force_disturbed=disturbance.force * model.units.force,
         external_torque_disturbed=disturbance.torque * model.units.torque,
+    )
+
+
+def drive_of(task: Task, model: Model, motion: WholeHand) -> Drive:
+    """The motors that share joints, in SI; their limits as those of joints in `hand_of`, by virtual work.
+
+    Args:
+        task: names the actuator.
+        model: for the units.
+        motion: with a coupling.
+    """
+    coupling, actuator, torques = motion.coupling, task.actuator, 0.0
+    assert coupling is not None
+    for forces in (motion.force, motion.disturbed):
+        if forces is not None:
+            joints = joint_torques(model, replace(motion, force=forces))
+            torques = max(torques, float(np.abs(joints @ coupling.ratios).max()))
+    speed = float(np.abs(np.diff(coupling.positions, axis=0) / np.diff(model.schedule.samples)[:, None]).max())
+    return Drive(
+        ratios=tuple(tuple(row) for row in coupling.ratios.tolist()),
+        offsets=tuple(coupling.offsets.tolist()),
+        effort=actuator.torque or max(RESERVE * torques, LEAST) * model.units.torque,
+        velocity=actuator.speed or max(RESERVE * speed, LEAST),
     )

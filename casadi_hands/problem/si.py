@@ -92,6 +92,7 @@ def build_model(task: Task) -> Model:
         servo=round_off(task.hand.drive.motor.reach / length) if task.hand.drive.motor else 0.0,
         force_limit=given or USUAL_FORCE,
         clearance=round_off(task.hand.clearance / length),
+        ratios=task.hand.ratios,
     )
     return model if given else replace(model, force_limit=usual_force_limit(model))
 
@@ -147,8 +148,8 @@ def _scenarios(task: Task, schedule: Schedule, units: Units) -> tuple[Scenario, 
     return planned(len(schedule.samples)), *([disturbed] if disturbed.acts.any() else [])
 
 
-_RESERVE = 1.5  # of torque and speed limits over what the motion uses, where the task names none
-_LEAST = 0.01  # of the object's weight × length, and rad/s: no joint is so weak or slow that none could drive it
+RESERVE = 1.5  # of torque and speed limits over what the motion uses, where the task names none
+LEAST = 0.01  # of the object's weight × length, and rad/s: no joint is so weak or slow that none could drive it
 
 
 def hand_of(
@@ -179,15 +180,16 @@ def hand_of(
         )
         base = _triple(np.append(finger.base, STAND * model.link_radius) * length)
         built.append(Finger(model.contact_names[contact], base, links))
-    actuator = task.actuator
+    # A motor that joints share has other limits than they.
+    named = (None, None) if model.motors else (task.actuator.torque, task.actuator.speed)
     return Hand(
         palm_radius=task.palm.radius,
         palm_thickness=task.palm.thickness,
         fingers=tuple(built),
         joint_lower=model.joint_limits[0],
         joint_upper=model.joint_limits[1],
-        effort=actuator.torque or max(_RESERVE * effort, _LEAST * model.units.torque),
-        velocity=actuator.speed or max(_RESERVE * speed, _LEAST),
+        effort=named[0] or max(RESERVE * effort, LEAST * model.units.torque),
+        velocity=named[1] or max(RESERVE * speed, LEAST),
         density=task.hand.density,
         servo=task.hand.drive.servo,
     )

@@ -136,6 +136,11 @@ class HandSpec(Section):
         description="Density of links and palm, kg/m³; less than the material's for links that are not solid.",
         json_schema_extra={"default": "that of the material"},
     )
+    ratios: Pair = Field(
+        default=(0.1, 2.0),
+        description="Smallest and largest size of a joint's ratio to a motor that it shares (`motors`): its turn over "
+        "that of the joint which the motor turns one to one. A joint that the motor does not turn has 0.",
+    )
     contact_force: Positive | None = Field(
         default=None,
         description="Largest component of a contact force along an axis of the object frame, over the object's weight.",
@@ -162,6 +167,13 @@ class HandSpec(Section):
                 f"0, or at least {SHORTEST_HINGE} × link_radius ({SHORTEST_HINGE * radius:.4g}) and less than the "
                 f"shortest link ({length[0]:.4g})"
             )
+        return value
+
+    @field_validator("ratios")
+    @classmethod
+    def _ratios_in_order(cls, value: Pair) -> Pair:
+        if not 0 < value[0] <= 1 <= value[1]:
+            raise refuse("[smallest, largest] with 0 < smallest <= 1 <= largest")
         return value
 
     @field_validator("joint_limits")

@@ -59,6 +59,10 @@ class Limits(Section):
     joint_limit: NonNegative = Field(default=0.001, description="Angle beyond a joint's limit, degrees.")
     speed: NonNegative = Field(default=1.0, description="Joint speed as a share of the actuator's, if one is named.")
     torque: NonNegative = Field(default=1.0, description="Joint torque as a share of the actuator's, if one is named.")
+    coupling: NonNegative = Field(
+        default=1e-4,
+        description="Angle by which a joint's command is off what the motors that share it turn it to, rad.",
+    )
     disturbance_radius: NonNegative = Field(
         default=0.0,
         description="Least size of the smallest wrench the grasp cannot resist, over weight. 0 asks for none: two "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
@@ -68,6 +68,11 @@ class Task(Section):
     hand: HandSpec = Field(default={}, validate_default=True, description="What fingers can be built.")
     fingertip: Fingertip = Field(default={}, validate_default=True, description="The tips of the fingers.")
     actuator: Actuator = Field(default={}, validate_default=True, description="The motors.")
+    motors: Literal["independent", "fewest"] | Annotated[Whole, Field(ge=1)] = Field(
+        default="independent",
+        description="Motors of the hand: `independent`, one for every joint; `fewest`, as few as are found to turn all "
+        "joints by fixed ratios; or their number.",
+    )
     limits: Limits = Field(default={}, validate_default=True, description="Limits of the certificate.")
     search: Search = Field(default=Search(), description="The search over structures.")
     weights: Weights = Field(default=Weights(), description="Weights of the soft stages' cost terms.")

@@ -93,7 +93,11 @@ STAY_DESIGN = Term(
     weights={"refine": Weight(5.0, "knot")},
 )
 MOTOR_ACCELERATION = Term(
-    "motor_acceleration", "Acceleration of motors that share joints", "", "rad/s²", weights={"refine": Weight(1e-3, "knot")}
+    "motor_acceleration",
+    "Acceleration of motors that share joints",
+    "",
+    "rad/s²",
+    weights={"refine": Weight(1e-3, "knot")},
 )
 # No weight but in restorations.
 PROXIMITY = Term(

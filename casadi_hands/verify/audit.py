@@ -15,7 +15,7 @@ from casadi_hands.task import load_task
 from casadi_hands.verify.checks.certificate import certificate_problems
 from casadi_hands.verify.checks.structure import structure_problems
 from casadi_hands.verify.checks.trust import limit_notes
-from casadi_hands.verify.figures.clearance import joint_figures, penetration_figure
+from casadi_hands.verify.figures.clearance import joint_figure, penetration_figure, speed_figure
 from casadi_hands.verify.figures.contact import (
     friction_figures,
     gap_at_samples,
@@ -23,6 +23,7 @@ from casadi_hands.verify.figures.contact import (
     slip_figure,
     spin_figure,
 )
+from casadi_hands.verify.figures.coupling import coupling_figures, motor_speed_figure, motor_torque_figure
 from casadi_hands.verify.figures.disturbances import disturbed_figures
 from casadi_hands.verify.figures.dynamics import Shots, between_residual, sample_residual, shoot
 from casadi_hands.verify.figures.goals import goal_figures, rest_figure
@@ -98,8 +99,13 @@ def audit_files(directory: str | Path, task: str | Path | None = None) -> Audit:
         slip_figure(folder, path),
         spin_figure(folder, path),
         penetration_figure(folder, path),
-        *joint_figures(folder, path),
-        torque_figure(folder),
+        joint_figure(folder, path),
+        *(
+            [speed_figure(folder, path), torque_figure(folder)]
+            if folder.drive is None
+            else [motor_speed_figure(folder, folder.drive), motor_torque_figure(folder, folder.drive)]
+        ),
+        *coupling_figures(folder),
         unsupplied_figure(folder),
         disturbance_figure(folder, placed),
         *stability_figures(folder),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -63,7 +63,8 @@ class Source:
     def welded_urdf(self) -> str:
         """The hand as URDF text, its palm fixed to the link ``world`` where it is when the motion starts."""
         pose = self.motion.base_position[0].tolist(), self.motion.base_orientation[0].tolist()
-        return hand_urdf(self.hand, world=pose)
+        # Its controllers turn every joint, also where motors share them: nothing mimics anything.
+        return hand_urdf(replace(self.hand, drive=None), world=pose)
 
 
 def write_texts(folder: Path, texts: dict[str, str], mark: str) -> None:

@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from casadi_hands.nlp import Solution, Solver
+from casadi_hands.problem.coupling import Coupling
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.resampling import shortened
 from casadi_hands.problem.structure import Structure
-from casadi_hands.problem.coupling import Coupling
 from casadi_hands.stages.own_terms import own_weights
 from casadi_hands.stages.refine import coupling
 from casadi_hands.stages.refine.declaration import Bounds

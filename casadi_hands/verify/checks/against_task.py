@@ -101,11 +101,13 @@ def _motor_problems(folder: Folder, path: Trajectory) -> list[str]:
     motion, motor, problems = folder.motion, folder.task.actuator, []
     torques = np.max([np.abs(planned_torques(folder, force)).max(axis=0) for _, force, _ in folder.scenarios()], axis=0)
     speeds = np.abs(path.speeds).max(axis=0)
+    # A motor that joints share has other limits than they.
+    named = (motor.torque, motor.speed) if folder.drive is None else (None, None)
     for column, name in enumerate(motion.joint_names):
         joint = folder.joints[name]
         for word, has, needs, unit, of_motor in (
-            ("effort", joint.effort, torques[column], "N·m", motor.torque),
-            ("velocity", joint.velocity, speeds[column], "rad/s", motor.speed),
+            ("effort", joint.effort, torques[column], "N·m", named[0]),
+            ("velocity", joint.velocity, speeds[column], "rad/s", named[1]),
         ):
             if of_motor is not None and abs(has - of_motor) > ROUNDED * of_motor:
                 theirs = f"the task's motor's {of_motor:.4g}"

@@ -20,6 +20,9 @@ def command_problems(folder: Folder) -> list[str]:
         *_unlike(folder, "joint_velocities", velocities, "rad/s", "the motion turns it"),
         *_unlike(folder, "joint_torques", torques, "N·m", "the contact forces need"),
     ]
+    if folder.drive is not None and motion.motor_positions is not None:
+        due = folder.drive.offsets + motion.motor_positions @ folder.drive.ratios.T
+        return [*problems, *_unlike(folder, "joint_commands", due, "rad", "the motors of result.json turn it")]
     if folder.scene is None:
         return problems
     servos = {servo.joint: servo for servo in folder.scene.servos}

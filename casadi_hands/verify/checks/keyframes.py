@@ -21,7 +21,8 @@ def keyframe_problems(folder: Folder, scene: Scene) -> list[str]:
         k = int(np.argmin(np.abs(motion.time - time)))
         due = {"time": motion.time[[k]], "qpos": _coordinates(folder, scene, k)}
         if motion.joint_commands is not None:
-            due["ctrl"] = _in_order(folder, [servo.joint for servo in scene.servos], motion.joint_commands[k])
+            told = motion.joint_commands if folder.drive is None else motion.motor_positions
+            due["ctrl"] = _in_order(folder, [servo.joint for servo in scene.servos], told[k])
         if any(body.mocap for body in scene.bodies.values()):
             due["mpos"], due["mquat"] = motion.base_position[k], motion.base_orientation[k]
         for attribute, values in due.items():
@@ -33,8 +34,10 @@ def keyframe_problems(folder: Folder, scene: Scene) -> list[str]:
 
 
 def _in_order(folder: Folder, joints: list[str], values: np.ndarray) -> np.ndarray:
-    known = [folder.motion.joint_names.index(name) for name in joints if name in folder.motion.joint_names]
-    return values[known]
+    """Return values of joints, or of motors that share them, in the order of names; unknown ones are passed over."""
+    drive = folder.drive
+    own = list(folder.motion.joint_names) if drive is None or len(values) > len(drive.names) else drive.names
+    return values[[own.index(name) for name in joints if name in own]]
 
 
 def _coordinates(folder: Folder, scene: Scene, k: int) -> np.ndarray:
@@ -45,5 +48,8 @@ def _coordinates(folder: Folder, scene: Scene, k: int) -> np.ndarray:
             parts.append(np.concatenate([motion.base_position[k], motion.base_orientation[k]]))
         elif body.free:
             parts.append(np.concatenate([motion.object_position[k], motion.object_orientation[k]]))
-        parts.append(_in_order(folder, [hinge.name for hinge in body.hinges], motion.joint_angles[k]))
+        hinges = [hinge.name for hinge in body.hinges]
+        parts.append(_in_order(folder, hinges, motion.joint_angles[k]))
+        if motion.motor_positions is not None:
+            parts.append(_in_order(folder, hinges, motion.motor_positions[k]))
     return np.concatenate(parts) if parts else np.zeros(0)

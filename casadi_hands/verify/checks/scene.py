@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.verify.bodies import Body
+from casadi_hands.verify.checks.drive import scene_drive_problems
 from casadi_hands.verify.checks.keyframes import keyframe_problems
 from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.reading.scene_file import Scene, SceneBody
@@ -28,7 +29,11 @@ def scene_problems(folder: Folder) -> list[str]:
         *_world_problems(folder, scene),
         *_body_problems(folder, scene),
         *_hold_problems(folder, scene),
-        *_servo_problems(folder, scene),
+        *(
+            _servo_problems(folder, scene)
+            if folder.drive is None
+            else scene_drive_problems(folder, scene, folder.drive)
+        ),
         *keyframe_problems(folder, scene),
     ]
     return [f"scene.xml: {problem}" for problem in problems]
@@ -77,7 +82,8 @@ def _body_problems(folder: Folder, scene: Scene) -> list[str]:
     motion, moves = folder.motion, palm_moves(folder)
     due = {**folder.links, "object": folder.object}
     known = {*due, *(("palm_target",) if moves else ())}
-    problems = [f"body {name} is in no other file" for name in scene.bodies if name not in known]
+    shared = () if folder.drive is None else folder.drive.names
+    problems = [f"body {name} is in no other file" for name in scene.bodies if name not in (*known, *shared)]
     problems += [f"has no body {name}" for name in known if name not in scene.bodies]
     starts = {
         "palm": (motion.base_position[0], motion.base_orientation[0]),
@@ -174,6 +180,8 @@ def _servo_problems(folder: Folder, scene: Scene) -> list[str]:
         problems.append(
             f"its actuators turn {', '.join(names) or 'nothing'}; there must be one a joint, in their order"
         )
+    if scene.springs:
+        problems.append("it has springs, though every joint has a motor of its own")
     for servo in scene.servos:
         if servo.name != servo.joint:
             problems.append(f"the actuator of joint {servo.joint} is called {servo.name}")

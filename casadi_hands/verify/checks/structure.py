@@ -5,6 +5,7 @@ from __future__ import annotations
 from casadi_hands.verify.checks.against_task import hand_task_problems
 from casadi_hands.verify.checks.agreement import hand_problems, object_problems, record_problems
 from casadi_hands.verify.checks.commands import command_problems
+from casadi_hands.verify.checks.drive import drive_problems
 from casadi_hands.verify.checks.motion import motion_problems
 from casadi_hands.verify.checks.palm import palm_problems
 from casadi_hands.verify.checks.scene import scene_problems
@@ -35,6 +36,7 @@ def structure_problems(folder: Folder, path: Trajectory) -> list[str]:
         *servo_problems(folder),
         *palm_problems(folder),
         *record_problems(folder),
+        *drive_problems(folder),
         *command_problems(folder),
         *scene_problems(folder),
         *table_problems(folder),

@@ -14,7 +14,7 @@ _UNITS = {
     **dict.fromkeys(("contact_force", "contact_force_disturbed", "external_force", "external_force_disturbed"), "N"),
     "contact_moment": "N m",
     **dict.fromkeys(("joint_torques", "external_torque", "external_torque_disturbed"), "N m"),
-    **dict.fromkeys(("joint_angles", "joint_commands"), "rad"),
+    **dict.fromkeys(("joint_angles", "joint_commands", "motor_positions"), "rad"),
     **{"time": "s", "joint_velocities": "rad/s"},
     **dict.fromkeys(("object_orientation", "base_orientation", "contact_active"), ""),
 }
@@ -57,6 +57,8 @@ def _columns(folder: Folder) -> dict[str, np.ndarray]:
             continue
         if name.startswith("joint_"):
             parts = list(zip(motion.joint_names, array.T, strict=True))
+        elif name == "motor_positions":
+            parts = [(f"motor{m}", column) for m, column in enumerate(array.T)]
         elif name.startswith("contact_"):
             parts = list(zip(motion.contact_names, np.moveaxis(array, 1, 0), strict=True))
         else:

@@ -67,8 +67,8 @@ def penetration_figure(folder: Folder, path: Trajectory) -> Figure:
     return Figure("penetration", worst[0], folder.task.limits.penetration, "m", worst[1], by_interval=depths)
 
 
-def joint_figures(folder: Folder, path: Trajectory) -> list[Figure]:
-    """Return the angle beyond a joint's limit, deg, and the largest joint speed."""
+def joint_figure(folder: Folder, path: Trajectory) -> Figure:
+    """Return the angle beyond a joint's limit, deg."""
     columns = folder.joint_columns()
     low, high = folder.model.lowerPositionLimit[columns], folder.model.upperPositionLimit[columns]
     over = np.rad2deg(np.maximum(path.joints - high, low - path.joints))
@@ -80,15 +80,20 @@ def joint_figures(folder: Folder, path: Trajectory) -> list[Figure]:
     by_interval = np.zeros(len(folder.motion.time) - 1)
     np.maximum.at(by_interval, path.interval, over.max(axis=1))
     value = max(float(over[i, j]), 0.0)
-    beyond = Figure("joint_limit", value, limits.joint_limit, "deg", words, by_interval=by_interval)
+    return Figure("joint_limit", value, limits.joint_limit, "deg", words, by_interval=by_interval)
+
+
+def speed_figure(folder: Folder, path: Trajectory) -> Figure:
+    """Return the largest joint speed: a share of the actuator's where the task names one, else in rad/s."""
     speed = np.abs(path.speeds)
     i, j = np.unravel_index(np.argmax(speed), speed.shape)
     name = folder.motion.joint_names[j]
     where = f"joint {name} of {_finger(folder, name)} at {path.time[i]:.3g} s"
     if folder.task.actuator.speed is None:
-        return [beyond, Figure("speed", float(speed[i, j]), None, "rad/s", f"{{value}} in {where}")]
+        return Figure("speed", float(speed[i, j]), None, "rad/s", f"{{value}} in {where}")
     share = float(speed[i, j]) / folder.task.actuator.speed
-    return [beyond, Figure("speed", share, limits.speed, "share", f"{{value}} of the actuator's speed in {where}")]
+    limit = folder.task.limits.speed
+    return Figure("speed", share, limit, "share", f"{{value}} of the actuator's speed in {where}")
 
 
 def _finger(folder: Folder, joint: str) -> str:

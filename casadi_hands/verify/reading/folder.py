@@ -16,6 +16,7 @@ from casadi_hands.errors import DesignError
 from casadi_hands.problem.motion import Motion
 from casadi_hands.task import Task, load_task
 from casadi_hands.verify.bodies import Body, ground_body
+from casadi_hands.verify.reading.drive import Drive, read_drive
 from casadi_hands.verify.reading.robot import Joint, Robot, read_robot
 from casadi_hands.verify.reading.scene_file import Scene, read_scene
 from casadi_hands.verify.reading.stored import read_motion, read_record
@@ -45,6 +46,7 @@ class Folder:
         scene: from ``scene.xml``; None where there is none.
         task_hash: SHA-256 of ``task.yaml``.
         strange: what the two URDF files hold that the format does not have, a sentence each.
+        drive: of motors that share joints, from ``result.json``; None where every joint has its own.
         model: numeric Pinocchio model of ``hand.urdf``; its world is the palm's frame.
     """
 
@@ -60,6 +62,7 @@ class Folder:
     scene: Scene | None
     task_hash: str
     strange: tuple[str, ...]
+    drive: Drive | None
     model: pin.Model
 
     @cached_property
@@ -155,18 +158,21 @@ def read_folder(directory: str | Path, task: str | Path | None = None) -> Folder
             raise DesignError(f"{path / name}: missing; the design has no complete motion to check")
     hand, object_file = read_robot(path / "hand.urdf"), read_robot(path / "object.urdf")
     written = load_task(path / "task.yaml")
+    motion, result = read_motion(path / "motion.npz"), read_record(path / "result.json")
+    motors = None if motion.motor_positions is None else motion.motor_positions.shape[1]
     folder = Folder(
         path=path,
         task=written if task is None else load_task(task),
         written=written,
         trusted=None if task is None else Path(task),
-        motion=read_motion(path / "motion.npz"),
-        result=read_record(path / "result.json"),
+        motion=motion,
+        result=result,
         links=hand.links,
         joints=hand.joints,
         object=_object(path / "object.urdf", object_file),
         scene=read_scene(path / "scene.xml") if (path / "scene.xml").is_file() else None,
         task_hash=hashlib.sha256((path / "task.yaml").read_bytes()).hexdigest(),
+        drive=read_drive(path / "result.json", result, len(motion.joint_names), motors),
         strange=(*hand.strange, *object_file.strange),
         model=_model(path / "hand.urdf", hand),
     )

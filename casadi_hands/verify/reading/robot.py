@@ -29,6 +29,7 @@ class Joint:
         lower, upper: rad.
         effort: N·m.
         velocity: rad/s.
+        mimic: the joint that this one follows, by which multiplier, plus how many rad.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Joint:
     upper: float
     effort: float
     velocity: float
+    mimic: tuple[str, float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,7 @@ def read_robot(path: Path) -> Robot:
         elif element.tag == "joint":
             name = name_of(path, element, joints)
             joints[name] = _read_joint(path, name, element)
-            strange += strangers(element, "parent child origin axis limit", "name type")
+            strange += strangers(element, "parent child origin axis limit mimic", "name type")
         elif element.tag == "mujoco":
             strange += _compiler(element)
         elif element.tag == "transmission":
@@ -137,7 +139,16 @@ def _read_joint(path: Path, name: str, element: Element) -> Joint:
         upper,
         able["effort"],
         able["velocity"],
+        _mimic(path, element),
     )
+
+
+def _mimic(path: Path, element: Element) -> tuple[str, float, float] | None:
+    """Return the joint that one follows, its multiplier and offset."""
+    mimic = only(path, element, "mimic")
+    if mimic is None:
+        return None
+    return mimic.get("joint", ""), number(path, mimic, "multiplier", "1"), number(path, mimic, "offset", "0")
 
 
 def _placement(path: Path, element: Element) -> np.ndarray:

@@ -12,7 +12,7 @@ from casadi_hands.errors import DesignError
 from casadi_hands.verify.reading.markup import called, name_of, number, numbers, only, positive, read_xml, strangers
 from casadi_hands.verify.shapes import Capsule, Cylinder, Shape
 
-_SECTIONS = "compiler option statistic default worldbody contact equality actuator keyframe visual asset"
+_SECTIONS = "compiler option statistic default worldbody contact equality tendon actuator keyframe visual asset"
 _OPTIONS = "timestep gravity integrator cone impratio noslip_iterations iterations tolerance solver"
 _GEOM = "name type pos fromto size friction condim priority solref solimp rgba"
 _KEY = ("time", "qpos", "ctrl", "mpos", "mquat")
@@ -88,6 +88,25 @@ class Servo:
 
 
 @dataclass(frozen=True)
+class Spring:
+    """A spring between a joint and the motors that share it: at rest where the sum of coefficient × angle is ``rest``.
+
+    Attributes:
+        name: the joint's.
+        rest: rad.
+        stiffness: N·m/rad.
+        damping: N·m·s/rad.
+        coefficients: by name of joint or motor.
+    """
+
+    name: str
+    rest: float
+    stiffness: float
+    damping: float
+    coefficients: dict[str, float]
+
+
+@dataclass(frozen=True)
 class Scene:
     """What ``scene.xml`` says.
 
@@ -99,6 +118,7 @@ class Scene:
         excluded: pairs of bodies that do not collide.
         welds: pairs of bodies that are held together.
         servos: in the file's order, which is that of MuJoCo's controls.
+        springs: in the file's order.
         keys: name -> attribute -> its numbers.
         strange: what the format does not have, a sentence each.
     """
@@ -110,6 +130,7 @@ class Scene:
     excluded: list[frozenset[str]] = field(default_factory=list)
     welds: list[tuple[str, str]] = field(default_factory=list)
     servos: list[Servo] = field(default_factory=list)
+    springs: list[Spring] = field(default_factory=list)
     keys: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)
     strange: list[str] = field(default_factory=list)
 
@@ -134,6 +155,7 @@ def read_scene(path: Path) -> Scene:
     scene = Scene(number(path, option, "timestep", "0.002"), numbers(path, option, "gravity", 3, "0 0 -9.81"))
     scene.strange.extend(strangers(root, _SECTIONS, "model"))
     allowed = {"compiler": ("", "angle"), "option": ("", _OPTIONS), "default": ("geom", ""), "contact": ("exclude", "")}
+    allowed |= {"tendon": ("fixed", "")}
     allowed |= {"equality": ("weld", ""), "actuator": ("position", ""), "keyframe": ("key", "")}
     for tag, (tags, attributes) in allowed.items():
         if (element := section[tag]) is not None:
@@ -163,11 +185,26 @@ def _read_entry(path: Path, scene: Scene, element: Element) -> None:
         odd += strangers(element, "", "name joint kp kv forcelimited forcerange")
         if element.get("forcelimited") != "true":
             odd.append(f"{called(element)} limits no torque: forcelimited is not true")
+    elif element.tag == "fixed":
+        scene.springs.append(_read_spring(path, scene, element))
     elif element.tag == "key":
         name = name_of(path, element, scene.keys)
         odd += strangers(element, "", " ".join(("name", *_KEY)))
         lengths = {key: len(text.split()) for key, text in element.items() if key in _KEY}
         scene.keys[name] = {key: numbers(path, element, key, length) for key, length in lengths.items()}
+
+
+def _read_spring(path: Path, scene: Scene, element: Element) -> Spring:
+    scene.strange.extend(strangers(element, "joint", "name springlength stiffness damping"))
+    coefficients: dict[str, float] = {}
+    for joint in element:
+        scene.strange.extend(strangers(joint, "", "joint coef"))
+        name = joint.get("joint", "")
+        if name in coefficients:
+            raise DesignError(f"{path}: {called(element)} pulls at joint '{name}' twice")
+        coefficients[name] = number(path, joint, "coef")
+    rest, damping = number(path, element, "springlength"), number(path, element, "damping", "0")
+    return Spring(element.get("name", ""), rest, positive(path, element, "stiffness"), damping, coefficients)
 
 
 def _read_body(path: Path, scene: Scene, element: Element, name: str) -> None:
@@ -218,11 +255,13 @@ def _read_looks(path: Path, element: Element) -> None:
 
 def _read_hinge(path: Path, scene: Scene, element: Element) -> Hinge:
     scene.strange.extend(strangers(element, "", "name axis ref limited range armature"))
+    number(path, element, "armature", "0")
+    axis, reference = numbers(path, element, "axis", 3), number(path, element, "ref", "0")
+    if element.get("limited") == "false" and element.get("range") is None:
+        return Hinge(element.get("name", ""), axis, reference, np.array([-np.inf, np.inf]))
     if element.get("limited") != "true":
         scene.strange.append(f"{called(element)} has no limits: limited is not true")
-    number(path, element, "armature", "0")
-    axis, limits = numbers(path, element, "axis", 3), numbers(path, element, "range", 2)
-    return Hinge(element.get("name", ""), axis, number(path, element, "ref", "0"), limits)
+    return Hinge(element.get("name", ""), axis, reference, numbers(path, element, "range", 2))
 
 
 def _read_geom(path: Path, scene: Scene, element: Element) -> Geom:

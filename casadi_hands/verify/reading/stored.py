@@ -38,6 +38,7 @@ _SHAPES: dict[str, tuple[str | int, ...]] = {
     "joint_velocities": ("S", "J"),
     "joint_torques": ("S", "J"),
     "joint_commands": ("S", "J"),
+    "motor_positions": ("S", "N"),
     "contact_moment": ("S", "C", 3),
     "contact_force_disturbed": ("S", "C", 3),
     "external_force_disturbed": ("S", 3),
@@ -58,6 +59,7 @@ def read_motion(path: Path) -> Motion:
     if missing:
         raise DesignError(f"{path}: no array {', '.join(missing)}")
     sizes = {"S": arrays["time"].size, "J": arrays["joint_names"].size, "C": arrays["contact_names"].size}
+    sizes["N"] = arrays["motor_positions"].shape[-1] if arrays.get("motor_positions", np.zeros(0)).ndim == 2 else 1
     for name, array in arrays.items():
         shape = tuple(sizes[size] if isinstance(size, str) else size for size in _SHAPES[name])
         if array.shape != shape:

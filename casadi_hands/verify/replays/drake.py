@@ -9,6 +9,8 @@ What means the same as in ``scene.xml``:
 
 - *Motors*: position and damping gains, implicit in the step; torque limits; rotor inertia; a hand that carries its own
   weight.
+- *Shared motors* are where they are told to be: what their springs pull at, and how fast, follows from their positions
+  alone. In ``scene.xml`` motors are bodies, a hundred times as stiff as the springs.
 - *Friction*: Coulomb's, with the task's coefficient where the object touches the hand, and the ground's where it
   touches the ground.
 - *Palm*: goes where the plan says with the plan's velocity, whatever pushes it.
@@ -78,7 +80,7 @@ class DrakeSimulation:
         if perturbation.torsion != 1.0:
             raise HandsError("Drake's contacts are patches, whose torsional friction is their own: no factor of it")
         self._drake = drake = load_drake()
-        self._names = folder.motion.joint_names
+        self._names, self._drive = folder.motion.joint_names, folder.drive
         motors, self._moves = read_motors(folder, perturbation)
         self._harder = perturbation.squeeze / perturbation.stiffness
         self._late = round(perturbation.delay / STEP)
@@ -234,8 +236,14 @@ class DrakeSimulation:
     ) -> None:
         """Set the motors' set points, with a share of what they are ahead of planned angles, and a step's wrenches."""
         told = max(i - self._late, 0)
-        targets = plan.angles[told] + self._bias + squeeze * self._harder * (plan.commands[told] - plan.angles[told])
-        desired = np.concatenate([targets[self._order], np.zeros(len(targets))])
+        targets, rates = plan.commands[told] + self._bias, np.zeros(len(self._names))
+        if self._drive is None:
+            ahead = squeeze * self._harder * (plan.commands[told] - plan.angles[told])
+            targets = plan.angles[told] + self._bias + ahead
+        elif plan.motors is not None and i > self._late:
+            # A spring's damper is between the joint and what its motors turn.
+            rates = self._drive.ratios @ (plan.motors[told] - plan.motors[told - 1]) / self.step
+        desired = np.concatenate([targets[self._order], rates[self._order]])
         self._plant.get_desired_state_input_port(self._hand).FixValue(self._context, desired)
         wrenches = [self._wrench(self._object, self._center, force, torque), *self._unborne]
         if self._moves:

@@ -69,6 +69,8 @@ class Motor:
 def read_motors(folder: Folder, perturbation: Perturbation) -> tuple[dict[str, Motor], bool]:
     """Return the motor of every joint in ``scene.xml``, perturbed, and whether the palm moves."""
     root, factor = _read(folder, "scene.xml"), perturbation.stiffness
+    if folder.drive is not None:
+        return _springs(folder, root, perturbation), _palm_moves(root)
     try:
         armature = {joint.get("name"): float(joint.get("armature", "0")) for joint in root.iter("joint")}
         motors = {
@@ -85,7 +87,33 @@ def read_motors(folder: Folder, perturbation: Perturbation) -> tuple[dict[str, M
         raise DesignError(f"{folder.path / 'scene.xml'}: a joint's motor is not as solve writes it: {error}") from None
     if any(name not in motors for name in folder.motion.joint_names):
         raise DesignError(f"{folder.path / 'scene.xml'}: it lacks a joint or an actuator of this hand")
-    return motors, any(body.get("name") == "palm_target" for body in root.iter("body"))
+    return motors, _palm_moves(root)
+
+
+def _springs(folder: Folder, root: ElementTree.Element, perturbation: Perturbation) -> dict[str, Motor]:
+    """Return what turns every joint where motors share them: its spring, about where they turn it."""
+    factor = perturbation.stiffness
+    try:
+        armature = {joint.get("name"): float(joint.get("armature", "0")) for joint in root.iter("joint")}
+        springs = {
+            name: Motor(
+                stiffness=factor * float(spring.attrib["stiffness"]),
+                damping=factor**0.5 * float(spring.attrib["damping"]),
+                armature=armature[name],
+                effort=float("inf"),
+            )
+            for spring in root.iter("fixed")
+            if (name := spring.get("name", ""))
+        }
+    except (KeyError, ValueError) as error:
+        raise DesignError(f"{folder.path / 'scene.xml'}: a joint's spring is not as solve writes it: {error}") from None
+    if any(name not in springs for name in folder.motion.joint_names):
+        raise DesignError(f"{folder.path / 'scene.xml'}: it lacks a joint or a spring of this hand")
+    return springs
+
+
+def _palm_moves(root: ElementTree.Element) -> bool:
+    return any(body.get("name") == "palm_target" for body in root.iter("body"))
 
 
 def _read(folder: Folder, name: str) -> ElementTree.Element:
@@ -96,8 +124,11 @@ def _read(folder: Folder, name: str) -> ElementTree.Element:
 
 
 def read_mechanics(folder: Folder, name: str) -> str:
-    """Return a URDF file's text without shapes."""
+    """Return a URDF file's text without shapes; nor do joints mimic others, which for Drake leaves out their springs."""
     root = _read(folder, name)
+    for joint in root.findall("joint"):
+        for mimic in joint.findall("mimic"):
+            joint.remove(mimic)
     for link in root.iter("link"):
         for shape in [*link.findall("visual"), *link.findall("collision")]:
             link.remove(shape)

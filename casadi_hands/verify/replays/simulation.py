@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from casadi_hands.errors import DesignError, HandsError
 from casadi_hands.verify.figures.dynamics import object_rotation, shoot
 from casadi_hands.verify.reading.folder import Folder
+from casadi_hands.verify.replays.actuation import Actuation, OwnMotors, SharedMotors, bias
 from casadi_hands.verify.replays.perturb import Perturbation
 from casadi_hands.verify.trajectory import build_trajectory
 
@@ -60,6 +61,7 @@ class Plan:
     Attributes:
         time: (T,) s.
         angles, commands: (T, J) rad, planned and told to the motors.
+        motors: (T, N) rad, positions of the motors that share joints; None where every joint has its own.
         palm_position, palm_quaternion: (T, 3) m and (T, 4) [w, x, y, z], world.
         external_force, external_torque: (T, 3) what the task itself applies to the object, N and N·m, world.
     """
@@ -87,6 +89,7 @@ class Plan:
             return np.asarray(make_interp_spline(motion.time, values, k=1)(time))
 
         self.angles, self.commands = coarse(motion.joint_angles), coarse(motion.joint_commands)
+        self.motors = None if motion.motor_positions is None else coarse(motion.motor_positions)
         self.external_force, self.external_torque = coarse(motion.external_force), coarse(motion.external_torque)
         self.palm_position, self._object_position = coarse(motion.base_position), dense(path.placed["object"][1])
         turns = coarse(continuous(motion.base_orientation))
@@ -144,8 +147,8 @@ class Simulation:
         except ValueError as error:
             raise DesignError(f"{file}: {error}") from None
         self._find(folder, file)
-        self._bias = np.asarray(perturbation.joint_bias or np.zeros(len(folder.motion.joint_names)))
-        self._displaced, self._harder = perturbation.displaced, perturbation.squeeze / perturbation.stiffness
+        self._bias = bias(perturbation, len(folder.motion.joint_names))
+        self._perturbation = perturbation
         self._perturb(perturbation)
         self.data = mujoco.MjData(self.model)
         mujoco.mj_setConst(self.model, self.data)
@@ -163,21 +166,21 @@ class Simulation:
         target = find(kinds.mjOBJ_BODY, "palm_target")
         self._mocap = int(model.body_mocapid[target]) if target >= 0 else -1
         joints = [find(kinds.mjOBJ_JOINT, name) for name in folder.motion.joint_names]
-        driven = model.actuator_trnid[:, 0].tolist()
-        if self._object < 0 or -1 in self._links.values() or any(joint not in driven for joint in joints):
+        if self._object < 0 or -1 in self._links.values() or -1 in joints:
             raise DesignError(f"{file}: it lacks the object, a link, a joint or an actuator of this hand")
-        self._actuators = np.array([driven.index(joint) for joint in joints], dtype=int)
+        self._motors: Actuation
+        if folder.drive is None:
+            self._motors = OwnMotors(self._mujoco, model, folder, file)
+        else:
+            self._motors = SharedMotors(self._mujoco, model, folder, folder.drive, file)
         self._angles = [int(model.jnt_qposadr[joint]) for joint in joints]
         free = int(model.body_jntadr[self._object])
         self._pose, self._twist = int(model.jnt_qposadr[free]), int(model.jnt_dofadr[free])
 
     def _perturb(self, perturbation: Perturbation) -> None:
         """Change the model as the perturbation says."""
-        model, driven = self.model, self._actuators
-        model.actuator_gainprm[driven, 0] *= perturbation.stiffness
-        model.actuator_biasprm[driven, 1] *= perturbation.stiffness
-        model.actuator_biasprm[driven, 2] *= np.sqrt(perturbation.stiffness)
-        model.actuator_forcerange[driven] *= perturbation.effort
+        model = self.model
+        self._motors.perturb(model, perturbation)
         model.body_mass[self._object] *= perturbation.mass
         model.body_inertia[self._object] *= perturbation.mass
         model.geom_friction *= perturbation.friction
@@ -219,12 +222,12 @@ class Simulation:
     def settle(self, plan: Plan, observer: Observer | None) -> None:
         """Squeeze at the start pose; an object off its place is held there by a soft support, which then lets go."""
         told = np.maximum(np.arange(len(plan)) - self._late, 0)
-        ahead = self._harder * (plan.commands[told] - plan.angles[told])
-        self._set_points = plan.angles[told] + self._bias + ahead  # (T, J) rad
+        self._set_points, ahead = self._motors.set_points(plan, told, self._perturbation)
+        displaced = self._perturbation.displaced
         for i in range(round((SQUEEZE + RELEASE) / self.step)):
             time = i * self.step
-            share = 1.0 - max(0.0, time - SQUEEZE) / RELEASE if self._displaced else 0.0
-            squeeze = min(time / SQUEEZE, 1.0) if self._displaced else 1.0
+            share = 1.0 - max(0.0, time - SQUEEZE) / RELEASE if displaced else 0.0
+            squeeze = min(time / SQUEEZE, 1.0) if displaced else 1.0
             force, torque = self._support(share) if share else (np.zeros(3), np.zeros(3))
             # What the fingers do not bear yet: on its springs alone the object would sag and be gripped there.
             unborne = -(1.0 - squeeze) * self.model.body_mass[self._object] * self.model.opt.gravity
@@ -264,8 +267,8 @@ class Simulation:
         self._advance(plan.external_force[i] + push, plan.external_torque[i], observer)
 
     def _follow(self, plan: Plan, i: int, set_points: np.ndarray) -> None:
-        """Set the motors' set points (J,), rad, and the palm's target for a step."""
-        self.data.ctrl[self._actuators] = set_points
+        """Set the motors' set points (N,), rad, and the palm's target for a step."""
+        self.data.ctrl[self._motors.indices] = set_points
         if self._mocap >= 0:
             self.data.mocap_pos[self._mocap] = plan.palm_position[i]
             self.data.mocap_quat[self._mocap] = plan.palm_quaternion[i]
