@@ -35,6 +35,10 @@ def design_summary(design: Design, folder: Path) -> RenderableType:
     if design.hand is not None:
         fingers = ", ".join(f"{finger.name} {len(finger.links)}" for finger in design.hand.fingers)
         parts.append(Text(f"joints: {fingers}; {design.hand.degrees_of_freedom} in all"))
+        if design.hand.drive is not None:
+            motors = design.hand.motors
+            drive = "1 motor drives" if motors == 1 else f"{motors} motors drive"
+            parts.append(Text(f"motors: {drive} {design.hand.degrees_of_freedom} joints"))
     if design.seconds:
         # The total last, whatever order the stages were written in.
         spent = sorted(design.seconds.items(), key=lambda item: item[0] == "total")

@@ -12,9 +12,9 @@ Choices a reader of the file should know:
 - **Motors.** See `casadi_hands.problem.motors`; torque is limited to the hand's effort. The hand carries its own weight
   (``gravcomp``), as a controller that knows its hand does. Targets are not clamped, so that a feed-forward torque can
   be given as an offset of the target (see `casadi_hands.export.commands`).
-- **Shared motors.** Where motors share joints, each is a hinge of its own, ``motor{m}``, with a stiff position actuator.
-  A fixed tendon pulls at every joint, by the joint's spring and damper, to where the motors turn it, and as hard at the
-  motors, by virtual work.
+- **Shared motors.** Where motors share joints, each is a hinge of its own, ``motor{m}``, with a stiff position
+  actuator. A fixed tendon pulls at every joint, by the joint's spring and damper, to where the motors turn it, and as
+  hard at the motors, by virtual work.
 - **Start.** Bodies stand as at the motion's first sample, whose joint angles are the joints' reference: what loads the
   scene and resets nothing finds no finger in the object.
 - **Collisions.** Neighbours in a chain, the palm and first links among them, do not collide; all else does.

@@ -107,12 +107,25 @@ class Judge:
             remedy = motor_remedy(files, judged)
         return judged if remedy is None else replace(judged, reason=f"{judged.reason}. {remedy}")
 
+    def counted(self, design: Design) -> Design:
+        """The design, certified no more where it has more motors than the task asks for."""
+        asked, hand = design.task.motors, design.hand
+        if not isinstance(asked, int) or hand is None or hand.motors <= asked:
+            return design
+        where = f"{hand.motors} motors, {asked} asked for (motors)"
+        figure = {"value": float(hand.motors), "limit": float(asked), "holds": False, "unit": "", "where": where}
+        status = "feasible" if design.status == "certified" else design.status
+        return replace(design, status=status, certificate={**design.certificate, "motors": figure})
+
     def audited(self, design: Design) -> Audit:
         """What the audit finds in a design's files; of the same hand and motion as the last time, what it found."""
         if self._last is None or self._last[0] is not design.hand or self._last[1] is not design.motion:
             with tempfile.TemporaryDirectory() as scratch:
                 save_design(design, Path(scratch), page=False)
-                self._last = design.hand, design.motion, audit_files(scratch)
+                found = audit_files(scratch)
+            # How many motors are asked for is counted at last: a hand with more is where fewer are looked for from.
+            others = {name: figure for name, figure in found.figures.items() if name != "motors"}
+            self._last = design.hand, design.motion, replace(found, figures=others)
         return self._last[2]
 
     def _feasible(self, name: str, figure: dict[str, Any]) -> bool:

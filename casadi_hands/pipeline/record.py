@@ -35,22 +35,28 @@ class Progress:
     elapsed: float
 
 
+STOPPED = "it was stopped before fewer motors were looked for"
 AIM = 3.0  # deg from any goal in the replay as planned, beyond which more is tried
 
 
 def rank_of(design: Design) -> tuple[float, ...]:
     """How far a judged design is from what is aimed at, best first.
 
-    By limits that the files miss, limits that replays miss, drops, turns from goals beyond `AIM`, and the stiffness
-    that the grasp asks for.
+    By limits that the files miss, limits that replays miss, motors where joints share them, drops, turns from goals
+    beyond `AIM`, and the stiffness that the grasp asks for.
     """
     in_replays = design.missed_in_replays
     missed = len(design.missed) - len(in_replays)
-    played = (math.inf, math.inf, math.inf)
+    played = (math.inf, math.inf, math.inf, math.inf)
     if design.drops is not None:
-        played = len(in_replays), design.drops, max(design.replay_angle, AIM)
+        played = len(in_replays), _motors(design), design.drops, max(design.replay_angle, AIM)
     stiffness = design.certificate.get("least_stiffness", {}).get("value")
     return missed, *played, math.inf if stiffness is None else stiffness
+
+
+def _motors(design: Design) -> float:
+    """How many motors share the joints: fewer than these is what was asked for."""
+    return math.inf if design.hand is None or design.hand.drive is None else design.hand.motors
 
 
 class Record:
@@ -137,6 +143,9 @@ class Record:
         rank = rank_of(design)
         if design.status == "certified" and not design.replays:
             design = replace(design, status="feasible", reason="its files hold; it was stopped before it was replayed")
+        asked, hand = self.task.motors, design.hand
+        if design.status == "certified" and isinstance(asked, int) and hand is not None and hand.motors > asked:
+            design = replace(design, status="feasible", reason=STOPPED)
         if self._best is None or rank < self._best[0]:
             self._best = rank, design
             self.keep(design)

@@ -154,7 +154,7 @@ class Refiner:
             first = partial(again, larger=larger)
         with self.record.stage("refine", "the same motion with exact physics, rolling contacts and clearance"):
             refined = self._attempt(whole, margin, first)
-        if refined.exact or refined.barely_rolls or margin == SMALL:
+        if refined.exact or refined.barely_rolls or margin == SMALL or self.model.motors:
             return refined
         with self.record.stage("refine", "again, closer to the limits of friction and normal forces"):
             second = self._attempt(whole, SMALL, again)

@@ -18,6 +18,7 @@ from casadi_hands.execution.processes import processes, start_up
 from casadi_hands.export.design import Design
 from casadi_hands.nlp import SolverError
 from casadi_hands.pipeline.certify import Certifier
+from casadi_hands.pipeline.couplings import Coupler
 from casadi_hands.pipeline.judge import Judge
 from casadi_hands.pipeline.record import STAGES, Progress, Record
 from casadi_hands.pipeline.refiner import Refiner
@@ -108,7 +109,7 @@ def _refine_again(record: Record, start: Path) -> Design | None:
     record.update(stages=[{**run, "started_from": str(start)} for run in record.design.stages])
     record.update_best(design)
     if design.status == "certified":
-        return design
+        return Coupler(record, model, judge, 1).run(design)
     record.log("refine", f"from the earlier result no hand is certified: {design.reason}; now all stages")
     record.update(hand=None, motion=None, costs={})
     return None
@@ -138,7 +139,8 @@ def _run(record: Record, until: str, executor: Executor | None, jobs: int) -> De
         design = judge.judge(record.design, [shortcoming_reason(model, short) for short in found.short])
         judged = record.held_to_bounds(design)
         return judge.replayed(judged, jobs) if judged.status == "certified" else judged
-    return judge.concluded(Certifier(record, model, floating, search, judge, jobs).run(found), jobs)
+    design = judge.concluded(Certifier(record, model, floating, search, judge, jobs).run(found), jobs)
+    return Coupler(record, model, judge, jobs).run(design)
 
 
 def _stopped(record: Record, stage: str) -> Design:

@@ -33,7 +33,7 @@ class Coupling:
     @property
     def motors(self) -> int:
         """Their number."""
-        return self.ratios.shape[1]
+        return int(self.ratios.shape[1])
 
     @property
     def commands(self) -> Array:

@@ -36,7 +36,7 @@ class Drive:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """``motor0``, ``motor1``, …"""
+        """Of the motors: ``motor0``, ``motor1`` and so on."""
         return tuple(f"motor{m}" for m in range(self.motors))
 
     def commands(self, positions: Array) -> Array:

@@ -14,7 +14,8 @@ class Motion:
     """The arrays of ``motion.npz``: same names, shapes, units and frames (see ``docs/result-folder.md``).
 
     Moments of contacts are None of hard fingertips. Commands are None until there is a hand, and in files of versions
-    that did not write them; positions of motors are None where every joint has its own; what is disturbed is None where the task names no disturbance.
+    that did not write them; positions of motors are None where every joint has its own; what is disturbed is None where
+    the task names no disturbance.
     """
 
     time: np.ndarray

@@ -11,6 +11,7 @@ import numpy as np
 _UNITS = {
     "m": (1000.0, " mm"),
     "deg": (1.0, " deg"),
+    "rad": (1.0, " rad"),
     "weight": (1.0, " of the weight"),
     "N·m/rad": (1.0, " N·m/rad"),
     "weight/mm": (1.0, " weights/mm"),
@@ -36,6 +37,7 @@ UNIT_OF = {
     "link_stress": "Pa",
     **dict.fromkeys(("speed", "torque", "replay_dropped", "torsion_shortfall", "slide_shortfall"), "share"),
     "disturbance_radius": "weight",
+    "coupling": "rad",
 }
 """Units of the limits."""
 
@@ -59,8 +61,7 @@ class Figure:
         name: as in the certificate and, where it has a limit, in the task's ``limits``.
         value: the worst value over the motion, in ``unit``.
         limit: None when nothing is asked of the figure.
-        unit: ``m``, ``deg``, ``weight`` (the object's), ``share``, ``N``, ``N·m``, ``Pa``, ``rad/s`` or
-            none.
+        unit: ``m``, ``deg``, ``rad``, ``weight`` (the object's), ``share``, ``N``, ``N·m``, ``Pa``, ``rad/s`` or none.
         finding: the worst case as a sentence with ``{value}`` in it.
         at_least: whether the limit is a least value rather than a largest one.
         by_interval: of a figure between samples, what each interval (S - 1,) has of it, in ``unit``; of slip

@@ -54,9 +54,9 @@ class Alternative:
 def rank(designs: Mapping[int, Design]) -> list[Alternative]:
     """Rank designs for one task, best first, and say which to keep.
 
-    Certified designs come before feasible and these before failed ones; then those with fewer joints, with more
-    `margin`, with less torque in their hardest worked joint. Margins are compared to the nearest tenth, so that torque
-    decides between hands that are about as far from their limits.
+    Certified designs come before feasible and these before failed ones; then those with fewer motors, with fewer
+    joints, with more `margin`, with less torque in their hardest worked joint or motor. Margins are compared to the
+    nearest tenth, so that torque decides between hands that are about as far from their limits.
 
     Args:
         designs: seed -> what it gave.
@@ -118,8 +118,8 @@ def _share_left(name: str, figure: Mapping[str, Any]) -> float | None:
 
 
 def _key(design: Design) -> tuple[float, ...]:
-    joints = math.inf if design.hand is None else design.hand.degrees_of_freedom
-    return (_STATUS.index(design.status), joints, -round(margin(design), 1), largest_torque(design))
+    motors, joints = (math.inf,) * 2 if design.hand is None else (design.hand.motors, design.hand.degrees_of_freedom)
+    return (_STATUS.index(design.status), motors, joints, -round(margin(design), 1), largest_torque(design))
 
 
 def _alike(first: Design, second: Design) -> bool:

@@ -16,12 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from casadi_hands.motion import zero_order_hold
+from casadi_hands.problem.commands import coupled
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.resampling import at_rest, extrapolated, on_palm, resampled, resampled_model
 from casadi_hands.stages.refine.result import Refined, Run
 from casadi_hands.stages.refine.settings import (
     ALL_STEPS,
+    COUPLING_STEPS,
     LAST_STEP,
     NEARBY_STEPS,
     RENEWED_STEPS,
@@ -33,6 +35,7 @@ from casadi_hands.stages.refine.values import Margin
 
 SPARSE, COARSE = 0.4, 0.2  # s between knots, at most
 NEARLY_EXACT = 0.1  # cost of slip and of forces that no joint actuates, of a start that is nearly exact
+OFF_LINES = 0.01  # of any constraint: a coupled motion that misses more on sparse knots does on more of them, too
 LEAST_STEP = 0.05  # of the homotopy parameter
 LEAST = 0.1  # homotopy parameter for which a first exact motion is looked for
 
@@ -88,6 +91,8 @@ class Continuation:
             near: whether the motion is nearly exact already, and the hand shall stay nearly what it is: then shorter
                 ways are tried first.
         """
+        if self.model.motors:
+            return self._on_few(COUPLING_STEPS, start, margin)
         sequences: list[tuple[Step, ...]] = [ALL_STEPS]
         if near:
             sequences.insert(0, NEARBY_STEPS)
@@ -159,7 +164,8 @@ class Continuation:
         pressing = np.linalg.norm(force[:, contacts], axis=2)[exact.hand.active[:, contacts]]
         firmer = margin.normal_force / max(float(np.quantile(pressing, 0.1)), exact.margin.normal_force)
         force[:, contacts] *= max(firmer, exact.margin.friction / margin.friction)
-        return replace(exact.hand, force=force)
+        hand = replace(exact.hand, force=force)
+        return coupled(self.model, hand, self.model.motors) if self.model.motors else hand
 
     def _on_few(self, steps: tuple[Step, ...], start: WholeHand, margin: Margin) -> Refined:
         """A motion solved on few knots and made exact at the task's samples, near the same motion all the while."""
@@ -174,7 +180,8 @@ class Continuation:
         """
         stage, found = self.sparse, self._named(self.sparse, find(self.sparse))
         surely_slips = found.slips_hopelessly and found.worst.violation <= STIFF_PENALTY.constr_viol_tol
-        if found.exact or surely_slips or self.coarse is self.sparse or self._mobility < 2:
+        off_lines = bool(self.model.motors) and found.worst.violation > OFF_LINES
+        if found.exact or surely_slips or off_lines or self.coarse is self.sparse or self._mobility < 2:
             return stage, found
         again = self._named(self.coarse, find(self.coarse))
         runs = found.runs + again.runs

@@ -50,6 +50,11 @@ ALL_STEPS: tuple[Step, ...] = (
 )
 # From an exact motion to one nearby; the first step can be left out where joints can follow and actuate the forces.
 NEARBY_STEPS: tuple[Step, ...] = (ALL_STEPS[1], ALL_STEPS[-1])
+# From an exact motion of independent joints to one whose commands are on few lines; what takes longer is not near.
+COUPLING_STEPS: tuple[Step, ...] = (
+    ALL_STEPS[1],
+    ("hard constraints", WEIGHTS | HARD, replace(HARD_CONSTRAINTS, max_iter=80)),
+)
 LAST_STEP: tuple[Step, ...] = NEARBY_STEPS[-1:]
 # Of the slip with which friction is on its cone: with penalties, and of hard constraints one after another from there.
 VISCOUS = 100.0

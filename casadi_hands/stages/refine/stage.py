@@ -135,7 +135,7 @@ class RefineStage:
             bounds = always | exact if what == "hard constraints" else always
             if start.coupling is not None:
                 low, high, lines = self._coupled(what, values, start.coupling)
-                lower, upper, bounds = lower | low, upper | high, bounds | lines
+                lower, upper, bounds = lower | low, upper | high, {**bounds, **lines}
             parameters |= self._weighted(weights) | self._slip_scale(scale) | self._spin_scale(what, sharp)
             solution = self.solver.solve(values, parameters, options, lower, upper, bounds)
             if what == "hard constraints" and not solution.violation <= MET:

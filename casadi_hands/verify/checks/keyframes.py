@@ -21,7 +21,7 @@ def keyframe_problems(folder: Folder, scene: Scene) -> list[str]:
         k = int(np.argmin(np.abs(motion.time - time)))
         due = {"time": motion.time[[k]], "qpos": _coordinates(folder, scene, k)}
         if motion.joint_commands is not None:
-            told = motion.joint_commands if folder.drive is None else motion.motor_positions
+            told = motion.joint_commands if motion.motor_positions is None else motion.motor_positions
             due["ctrl"] = _in_order(folder, [servo.joint for servo in scene.servos], told[k])
         if any(body.mocap for body in scene.bodies.values()):
             due["mpos"], due["mquat"] = motion.base_position[k], motion.base_orientation[k]

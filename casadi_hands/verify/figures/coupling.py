@@ -22,7 +22,7 @@ def coupling_figures(folder: Folder) -> list[Figure]:
 
 
 def _off_lines(folder: Folder, drive: Drive) -> Figure:
-    """Return the largest distance of q + τ / k, by which a joint presses as planned, from what its motors turn it to."""
+    """Return the largest distance of q + τ / k, with which joints press as planned, from what motors turn them to."""
     motion = folder.motion
     needed = motion.joint_angles + planned_torques(folder) / folder.task.actuator.stiffness
     assert motion.motor_positions is not None

@@ -124,7 +124,7 @@ def _read(folder: Folder, name: str) -> ElementTree.Element:
 
 
 def read_mechanics(folder: Folder, name: str) -> str:
-    """Return a URDF file's text without shapes; nor do joints mimic others, which for Drake leaves out their springs."""
+    """Return a URDF file's text without shapes and mimics, by which Drake would leave out the springs."""
     root = _read(folder, name)
     for joint in root.findall("joint"):
         for mimic in joint.findall("mimic"):
