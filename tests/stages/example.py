@@ -223,6 +223,15 @@ def segments_apart(a: Array, b: Array, c: Array, d: Array) -> float:
     return float(min(ends))
 
 
+def folds_apart(chain: Sequence[tuple[Array, Array]], radius: float) -> list[float]:
+    """Gaps of balls of a radius on neighbouring links' axes, two radii off the joint between them."""
+    gaps = []
+    for (start, joint), (_, end) in itertools.pairwise(chain):
+        balls = [joint + 2 * radius * (p - joint) / np.linalg.norm(p - joint) for p in (start, end)]
+        gaps.append(float(np.linalg.norm(balls[0] - balls[1])) - 2 * radius)
+    return gaps
+
+
 def palm_apart(point: Array, radius: float) -> float:
     """Signed distance of a point from a disc's body, which fills z < 0 below it."""
     height, beyond = point[2], np.hypot(point[0], point[1]) - radius

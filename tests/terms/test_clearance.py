@@ -18,6 +18,20 @@ OTHER = np.array([[-0.7, 0, 0], [-0.9, -0.4, 0.9], [-0.2, -0.8, 1.6]])
 BODIES = Capsule(np.array([-1, 0, 2.2]), np.array([1, 0.2, 2.4]), 0.3), Sphere(np.array([1.2, 1, 1]), 0.25)
 
 
+def fold_apart(points: np.ndarray, joint: int) -> float:
+    """Gap (coal) of two balls of the links' radius on the links at a joint, two radii off it each."""
+    balls = []
+    for end in (points[joint - 1], points[joint + 1]):
+        along = (end - points[joint]) / np.linalg.norm(end - points[joint])
+        balls += [coal.Sphere(RADIUS), coal.Transform3s(np.eye(3), points[joint] + 2 * RADIUS * along)]
+    return float(coal.distance(*balls, coal.DistanceRequest(), coal.DistanceResult()))
+
+
+def of_one(points: np.ndarray) -> np.ndarray:
+    ends = [(ca.SX(a), ca.SX(b)) for a, b in itertools.pairwise(points)]
+    return np.asarray(ca.evalf(clearance.links_of_one(ends, ca.SX(RADIUS)))).ravel()
+
+
 def links(points: np.ndarray) -> list[tuple[ca.DM, ca.DM]]:
     return [(ca.DM(a), ca.DM(b)) for a, b in itertools.pairwise(points)]
 
@@ -60,9 +74,23 @@ def test_links_of_two_fingers_and_of_one() -> None:
         coal_distance(*JOINTS[i : i + 2], *OTHER[j : j + 2], RADIUS, RADIUS) for i in range(3) for j in range(2)
     ]
     np.testing.assert_allclose(found, expected, atol=5e-4)
-    own = np.asarray(clearance.links_of_one(links(JOINTS), ca.DM(RADIUS))).ravel()
-    np.testing.assert_allclose(own, [coal_distance(*JOINTS[:2], *JOINTS[2:], RADIUS, RADIUS)], atol=5e-4)
-    assert clearance.links_of_one(links(JOINTS[:3]), ca.SX(RADIUS)).numel() == 0
+    folds = [fold_apart(JOINTS, 1), fold_apart(JOINTS, 2)]
+    np.testing.assert_allclose(
+        of_one(JOINTS), [coal_distance(*JOINTS[:2], *JOINTS[2:], RADIUS, RADIUS), *folds], atol=5e-4
+    )
+    np.testing.assert_allclose(of_one(JOINTS[:3]), folds[:1], atol=5e-4)
+    assert of_one(JOINTS[:2]).size == 0
+
+
+@pytest.mark.parametrize("degrees", [0, 30, 90, 119, 121, 150, 180])
+def test_neighbours_are_apart_up_to_120_degrees_whatever_their_lengths(degrees: float) -> None:
+    # Two radii off the joint, balls of a radius just touch where the links make an equilateral triangle with it.
+    angle = np.radians(degrees)
+    for length in (0.15, 0.8):
+        points = np.array([[0, 0, 0], [0, 0, 0.5], [0, length * np.sin(angle), 0.5 + length * np.cos(angle)]])
+        (found,) = of_one(points)
+        assert found == pytest.approx(4 * RADIUS * np.cos(angle / 2) - 2 * RADIUS, abs=5e-4)
+        assert (found > 0) == (degrees < 120)
 
 
 def test_links_and_palm_are_seen_beside_above_and_below_its_rim() -> None:

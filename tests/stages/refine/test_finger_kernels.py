@@ -25,7 +25,7 @@ from tests.stages.blocks import (
     shape,
     surface,
 )
-from tests.stages.example import STAND, PinFinger, nearest_on_axis, palm_apart
+from tests.stages.example import STAND, PinFinger, folds_apart, nearest_on_axis, palm_apart
 
 Array = np.ndarray
 Block = tuple[dict[str, object], dict[str, object]]
@@ -281,12 +281,6 @@ def pair_block(one: FingerSeed, other: FingerSeed) -> Block:
     return variables, {"frames0": frames(one), "frames1": frames(other), "radius": RADIUS}
 
 
-def beside_joint(link: tuple[Array, Array], after: tuple[Array, Array]) -> float:
-    """How far two links are apart a hinge's length beyond the joint between them."""
-    balls = [at + 2 * RADIUS * (end - at) / np.linalg.norm(end - at) for at, end in (link[::-1], after)]
-    return float(np.linalg.norm(balls[0] - balls[1]) - 2 * RADIUS)
-
-
 @pytest.mark.parametrize(("touched", "grounded"), [(None, False), (1, False), (None, True), (0, True)])
 def test_clearances_of_a_finger_are_those_of_coal(touched: int | None, grounded: bool) -> None:
     joints = 3
@@ -301,7 +295,7 @@ def test_clearances_of_a_finger_are_those_of_coal(touched: int | None, grounded:
         for start, end in links[1:]:
             expected += [palm_apart(p, PALM_RADIUS) - RADIUS for p in ((start + end) / 2, end)]
         expected.append(between(links[0], links[2], 2 * RADIUS))
-        expected += [beside_joint(*pair) for pair in itertools.pairwise(links)]
+        expected += folds_apart(links, RADIUS)
         if grounded:
             joints_and_tip = [links[0][0], *[end for _, end in links]]
             heights = [(place.palm.apply(p) + place.palm_position)[2] for p in joints_and_tip]

@@ -48,7 +48,7 @@ def test_overlaps_between_knots_are_found_and_shallow_ones_are_not(step: float) 
     made_up = MadeUp(resampled_model(model, model.schedule.stepped(step)), (0, 2), lifted={})
     structure, rng, found = made_up.stage.structure, np.random.default_rng(0), set()
     deep = -DEEP * made_up.model.link_radius
-    for _ in range(30):
+    for _ in range(60):
         angles = tuple(rng.uniform(-1.2, 1.2, a.shape) for a in made_up.start.angles)
         least = shallowest(made_up, angles)  # type: ignore[arg-type]
         if abs(least - deep) > 1e-3:

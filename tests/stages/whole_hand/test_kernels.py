@@ -20,6 +20,7 @@ from tests.stages.example import (
     cone,
     doubling_each_weight,
     everything,
+    folds_apart,
     g,
     made_up_finger,
     made_up_values,
@@ -37,8 +38,9 @@ from tests.stages.object_motion.test_kernels import Witness as ObjectWitness
 
 Array = np.ndarray
 MARGIN = 0.03
-CONTACTS, JOINTS = (0, 1, 2), (1, 2, 3)
+CONTACTS, JOINTS, SEEDS = (0, 1, 2), (1, 2, 3), (0, 1, 4)
 BENDS = (1.8, 1.8, 0.4)  # rad: two beyond the joint limits, one straight into the object
+FOLDED = (1.5, 0.0)  # rad, of a link that its joint then folds onto the one before
 HAND_TERMS = {
     "contact_on_finger",
     "slip_on_finger",
@@ -56,7 +58,7 @@ class Witness(ObjectWitness):
 
     def __init__(self, model: Model, values: dict[str, Array], fingers: tuple[FingerSeed, ...]) -> None:
         super().__init__(model, values)
-        self.fingers, self.values, self.deepest = fingers, values, 0.0
+        self.fingers, self.values, self.deepest, self.folded = fingers, values, 0.0, 0.0
         self.pins = [PinFinger(seed, model.link_radius) for seed in fingers]
         self.palms = [self.palm_at(0), self.palm_at(-1)]
         self.objects = [self.motion.at(0), self.motion.at(-1)]
@@ -140,6 +142,9 @@ class Witness(ObjectWitness):
                 apart += [(palm.apply(p) + position)[2] - model.ground - radius for p in joints]
                 if len(chain) == 3:
                     apart.append(segments_apart(*chain[0], *chain[2]) - 2 * radius)
+                folds = folds_apart(chain, radius)
+                apart += folds
+                self.folded = max([self.folded, *(MARGIN - fold for fold in folds)])
                 for capsule in map(rod, model.bodies):
                     ends = (self.in_palm(s, capsule[:3]), self.in_palm(s, capsule[3:6]))
                     gaps = [segments_apart(*link, *ends) - radius - capsule[6] for link in chain]
@@ -160,7 +165,8 @@ class Case:
     def __init__(self, palm_moves: bool) -> None:
         self.task, self.model = everything()
         self.stage = WholeHandStage(self.model, CONTACTS, JOINTS, palm_moves)
-        self.fingers = tuple(made_up_finger(self.model, n, 1, seed=c, bend=BENDS[c]) for c, n in enumerate(JOINTS))
+        self.fingers = tuple(made_up_finger(self.model, n, 1, *at) for n, *at in zip(JOINTS, SEEDS, BENDS, strict=True))
+        self.fingers[1].bends[1] = FOLDED
         self.values = made_up_values(self.model)
         self.values |= {f"angles{c}": f.angles for c, f in enumerate(self.fingers)}
         if palm_moves:
@@ -170,6 +176,7 @@ class Case:
         self.expected = witness.terms()
         # A last link is in the object somewhere, or the cost of that would go unseen.
         assert witness.deepest > 0.02
+        assert witness.folded > 0.02
 
     def parameters(self, weights: dict[str, float]) -> dict[str, object]:
         return self.stage._parameters(self.fingers) | term_weights(self.stage.problem, self.model, weights)
