@@ -28,7 +28,9 @@ def random_finger(target: Target, contact: int, joints: int, rng: np.random.Gene
     lengths = np.clip(rng.uniform(0.8, 1.6, joints) * span / joints, shortest, longest)
     angles = rng.uniform(0.6 * low, 0.6 * high, joints)
     tip = target.tip_arc * rng.uniform(-0.7, 0.7, (target.strings(contact), 2))
-    bends = _random_bends(joints, min(target.bend, SEED_BEND), rng)
+    # No axis stands nearer than by half the bend to both links beside it.
+    most = min(target.bend, SEED_BEND, 2 * np.arccos(target.model.axis_cosines[0]))
+    bends = _random_bends(joints, most, rng)
     links = [_links_beside(bend)[: 1 if j == 0 else 2] for j, bend in enumerate(bends)]
     return FingerSeed(
         base=base,
@@ -56,16 +58,29 @@ def _links_beside(bend: Array) -> Array:
 
 
 def _hinge_axis(links: Array, cosines: tuple[float, float], rng: np.random.Generator) -> Array:
-    """An axis (3,) uniform over those with allowed cosines to links (K, 3); one across all of them if these are few."""
+    """An axis (3,) uniform over those with allowed cosines to links (K, 3); if these are few, one amid them."""
     for _ in range(TRIES):
         axis = _random_axis(rng)
         size = np.abs(links @ axis)
         if np.all((cosines[0] <= size) & (size <= cosines[1])):
             return axis
-    across = np.cross(links[0], links[-1])
-    if np.linalg.norm(across) < 1e-3:
-        across = np.cross(links[0], axis)
-    return np.asarray(across / np.linalg.norm(across))
+    return _axis_amid(links, cosines, axis)
+
+
+def _axis_amid(links: Array, cosines: tuple[float, float], axis: Array) -> Array:
+    """The axis (3,) at one allowed angle from links (K, 3) that are bent by no more than twice the largest.
+
+    Where they are straight on from each other it is turned about them as ``axis`` (3,) is.
+    """
+    middle, across = links.sum(axis=0), np.cross(links[0], links[-1])
+    middle /= np.linalg.norm(middle)
+    if np.linalg.norm(across) < 1e-9:
+        across = np.cross(middle, axis)
+    across /= np.linalg.norm(across)
+    largest, least = np.arccos(cosines)
+    angle = (max(least, np.arccos(min(links[0] @ middle, 1.0))) + largest) / 2
+    along = min(np.cos(angle) / (links[0] @ middle), 1.0)
+    return np.asarray(along * middle + np.sqrt(1 - along**2) * across)
 
 
 def _random_axis(rng: np.random.Generator) -> Array:
