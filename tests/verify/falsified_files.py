@@ -47,7 +47,14 @@ DISAGREEMENTS: Cases = {
         r"joint finger0_joint1: its axis in hand\.urdf is not a unit vector",
     ),
     "a length": (record("hand", "fingers", 0, "links", 0, "length", value=0.05), r"hand\.urdf has a capsule of"),
-    "a frame turned": (attribute(HAND, JOINT + "/origin", "rpy", "0 0 0.1"), r"its frame in hand\.urdf is turned"),
+    "a frame turned": (
+        attribute(HAND, JOINT + "/origin", "rpy", "0 0 0.1"),
+        r"finger 'one' \(link 1\): its frame in hand\.urdf is not turned at zero angle as result\.json has it bent",
+    ),
+    "a bend": (
+        record("hand", "fingers", 0, "links", 1, "bend", value=[1e-4, 0.0]),
+        r"finger 'one' \(link 1\): its frame in hand\.urdf is not turned at zero angle as result\.json has it bent",
+    ),
     "a link on another finger": (
         attribute(HAND, JOINT + "/parent", "link", "finger1_link0"),
         r"it hangs on finger 'two' \(link 0\)",

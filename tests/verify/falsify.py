@@ -16,8 +16,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from casadi_hands.errors import TaskError
+from casadi_hands.errors import DesignError, TaskError
 from casadi_hands.task import load_task, task_to_yaml
+from casadi_hands.verify.audit import audit_files
+from casadi_hands.verify.checks.structure import structure_problems
+from casadi_hands.verify.figures.dynamics import shoot
+from casadi_hands.verify.reading.folder import read_folder
+from casadi_hands.verify.trajectory import build_trajectory
 
 Falsify = Callable[[Path], None]
 Cases = dict[str, tuple[Falsify, str]]
@@ -30,6 +35,17 @@ BALL = "<collision><geometry><sphere radius='0.01'/></geometry></collision>"
 MASS = "<inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1'/></inertial>"
 KINEMATIC = {"joint_velocities": None, "joint_torques": None, "joint_commands": None}
 DISTURBED = "contact_force_disturbed", "external_force_disturbed", "external_torque_disturbed"
+
+
+def refusal(folder: Path) -> str:
+    """What the audit says against a folder, in lines; empty when it certifies it."""
+    try:
+        # What is wrong with the files is found faster than all figures are computed, and is enough.
+        read = read_folder(folder)
+        problems = structure_problems(read, build_trajectory(read, shoot(read)))
+        return "\n".join(problems or audit_files(folder).reasons)
+    except (DesignError, TaskError) as error:
+        return str(error)
 
 
 def both(*steps: Falsify) -> Falsify:

@@ -96,6 +96,11 @@ def _cylinder(link: ElementTree.Element, start: Any, end: Any, radius: float) ->
         _shape(link, role, "cylinder", (start + end) / 2, turn, radius=radius, length=length)
 
 
+def _roll_pitch_yaw(bend: tuple[float, float]) -> np.ndarray:
+    angles: np.ndarray = Rotation.from_rotvec([*bend, 0.0]).as_euler("xyz")
+    return angles
+
+
 def _shape(link: ElementTree.Element, role: str, kind: str, at: Any, turn: Any, **sizes: float) -> None:
     element = _element(link, role)
     _element(element, "origin", xyz=at, rpy=turn)
@@ -137,7 +142,7 @@ def hand_urdf(hand: Hand) -> str:
             joint = _element(robot, "joint", name=f"finger{i}_joint{j}", type="revolute")
             _element(joint, "parent", link=parent)
             _element(joint, "child", link=name)
-            _element(joint, "origin", xyz=origin)
+            _element(joint, "origin", xyz=origin, rpy=_roll_pitch_yaw(segment.bend))
             _element(joint, "axis", xyz=segment.axis)
             limits = {"lower": hand.joint_lower, "upper": hand.joint_upper}
             _element(joint, "limit", **limits, effort=hand.effort, velocity=hand.velocity)
@@ -162,7 +167,7 @@ def result(task: Task, hand: Hand, samples: int) -> dict[str, Any]:
         {
             "name": f.name,
             "base": f.base,
-            "links": [{"length": s.length, "radius": s.radius, "axis": s.axis} for s in f.links],
+            "links": [{"length": s.length, "radius": s.radius, "axis": s.axis, "bend": s.bend} for s in f.links],
         }
         for f in hand.fingers
     ]
@@ -248,7 +253,7 @@ limits: {{unsupplied_force: 10}}
 """
 
 
-def carried(directory: Path, more: str = "", shape: str = "capsule", hard: bool = False) -> Scene:
+def carried(directory: Path, more: str = "", shape: str = "capsule", hard: bool = False, bent: bool = False) -> Scene:
     """Three fingers of two joints, held stiff, and an object between them; the palm carries all along a free curve.
 
     Forces and torsional moments are chosen first and SciPy integrates the object under them; the palm then follows it
@@ -260,6 +265,7 @@ def carried(directory: Path, more: str = "", shape: str = "capsule", hard: bool 
         more: sections of the task beside those of `_TASK`.
         shape: of the object, ``capsule`` or ``cylinder``; contacts are on the side that both have.
         hard: whether fingertips are points, without moments.
+        bent: whether links are bent at zero angle; they stand where straight ones do.
     """
     fingertip = "fingertip: {torsion: 0}" if hard else ""
     time, ends = np.linspace(0.0, 2.0, 21), [[0, 0, 0.28]] * 2
@@ -270,7 +276,7 @@ def carried(directory: Path, more: str = "", shape: str = "capsule", hard: bool 
     forces, position, quaternion = _carrying(task, moments)
     goals = _goals([0, 1, 2], position[[0, 10, 20]], quaternion[[0, 10, 20]])
     task = read_task(directory, _TASK.format(*places, shape=shape, goals=goals, fingertip=fingertip) + more)
-    hand, angles, points = _grasp(task)
+    hand, angles, points = _grasp(task, BENDS if bent else ((0.0, 0.0),) * 2)
     turn = Rotation.from_quat(quaternion, scalar_first=True)
     base = Rotation.from_matrix(task.palm.rotation)
     samples = len(time)
@@ -443,7 +449,11 @@ def _integrated(
     return np.array(states)
 
 
-def _grasp(task: Task) -> tuple[Hand, np.ndarray, np.ndarray]:
+BENDS = ((20.0, -15.0), (-30.0, 10.0))
+"""Degrees that a finger's bent links are bent about the axis that straight ones turn about, and across that."""
+
+
+def _grasp(task: Task, bends: tuple[tuple[float, float], ...]) -> tuple[Hand, np.ndarray, np.ndarray]:
     """Return a hand whose three fingers touch the contacts, its angles (6,) and link points (3, 3).
 
     Each finger leans out and then in, in the plane of the palm's normal and its contact's direction.
@@ -458,15 +468,30 @@ def _grasp(task: Task) -> tuple[Hand, np.ndarray, np.ndarray]:
         # Both lengths follow from where the tip is once the base is 38 mm from the palm's centre, on its face.
         base = 0.038 * radial + [0.0, 0.0, STAND]
         lengths = np.linalg.lstsq(np.column_stack([outer, inner]), tip - base, rcond=None)[0]
-        axis = tuple(np.cross([0, 0, 1], radial).tolist())
-        links = tuple(Link(float(length), TIP, axis) for length in lengths)
-        fingers.append(Finger(name, tuple(base.tolist()), links))
-        angles += [out_angle, in_angle - out_angle]
-        turn = Rotation.from_rotvec(in_angle * np.array(axis))
+        axis, turn, links = np.cross([0, 0, 1], radial), Rotation.identity(), []
+        for length, way, bend in zip(lengths, (outer, inner), bends, strict=True):
+            link, angle = _pointing(float(length), turn.apply(way, inverse=True), axis, np.deg2rad(bend))
+            turn *= Rotation.from_rotvec([*link.bend, 0.0]) * Rotation.from_rotvec(angle * np.array(link.axis))
+            links.append(link)
+            angles.append(angle)
+        fingers.append(Finger(name, tuple(base.tolist()), tuple(links)))
         points.append(turn.apply(-TIP * radial, inverse=True) + np.array([0, 0, lengths[1]]))
     limits = np.deg2rad(150.0)
     hand = Hand(0.05, float(task.palm.thickness), tuple(fingers), -limits, limits, 0.5, 5.0, float(task.hand.density))
     return hand, np.array(angles), np.array(points)
+
+
+def _pointing(length: float, way: np.ndarray, about: np.ndarray, bend: np.ndarray) -> tuple[Link, float]:
+    """Return a link and its joint's angle at which it points along ``way`` (3,), unit, in its parent's frame.
+
+    Its joint's axis stands across it, near ``about`` (3,), unit, across z; ``bend`` (2,) is about that and across it.
+    """
+    vector = bend[0] * about + bend[1] * np.cross([0.0, 0.0, 1.0], about)
+    left = Rotation.from_rotvec(vector).apply(way, inverse=True)
+    across = np.cross([0.0, 0.0, 1.0], left)
+    sine = float(np.linalg.norm(across)) * (1.0 if about @ across > 0 else -1.0)
+    x, y, z = (across / sine).tolist()
+    return Link(length, TIP, (x, y, z), (float(vector[0]), float(vector[1]))), float(np.arctan2(sine, left[2]))
 
 
 def _lean(radial: np.ndarray, angle: float) -> np.ndarray:
@@ -520,7 +545,8 @@ hand: {joint_limits: [-150, 150], link_radius: 0.006}
 """A ball of 3 cm that stands half a metre over an upright palm, for scenes where the hand matters little."""
 
 
-TWIST = SPHERE.replace("position: [0, 0, -0.5]", "position: [-0.076, 0, -0.02]").replace("[-150, 150]", "[-170, 170]")
+TWIST = SPHERE.replace("position: [0, 0, -0.5]", "position: [-0.076, 0, -0.02]")
+TWIST = TWIST.replace("[-150, 150]", "[-170, 170], axes: {from_link: [0, 90]}")
 
 
 def geared(directory: Path, ball: float, finger: float) -> Scene:

@@ -12,13 +12,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from casadi_hands.errors import DesignError, TaskError
 from casadi_hands.export.table import motion_table
 from casadi_hands.verify.audit import audit, audit_files
-from casadi_hands.verify.checks.structure import structure_problems
-from casadi_hands.verify.figures.dynamics import shoot
 from casadi_hands.verify.reading.folder import read_folder
-from casadi_hands.verify.trajectory import build_trajectory
 from tests.verify.falsified_files import DISAGREEMENTS
 from tests.verify.falsified_hand import HAND_AGAINST_TASK, HIDDEN
 from tests.verify.falsified_motion import DISTURBANCES, NO_NUMBERS, TORSION
@@ -32,6 +28,7 @@ from tests.verify.falsify import (
     added,
     arrays,
     edited,
+    refusal,
     removed,
     reordered,
     task,
@@ -62,17 +59,6 @@ def bad(good: Path, tmp_path: Path) -> Path:
     return shutil.copytree(good, tmp_path / "bad")
 
 
-def _refusal(folder: Path) -> str:
-    """What the audit says against a folder, in lines; empty when it certifies it."""
-    try:
-        # What is wrong with the files is found faster than all figures are computed, and is enough.
-        read = read_folder(folder)
-        problems = structure_problems(read, build_trajectory(read, shoot(read)))
-        return "\n".join(problems or audit_files(folder).reasons)
-    except (DesignError, TaskError) as error:
-        return str(error)
-
-
 def test_the_good_result_is_certified(good: Path) -> None:
     assert audit(good, replays=0).reasons == []
 
@@ -100,7 +86,7 @@ def test_there_are_many() -> None:
 def test_falsified_results_are_refused_and_the_thing_is_named(bad: Path, name: str) -> None:
     falsify, named = CASES[name]
     falsify(bad)
-    said = _refusal(bad)
+    said = refusal(bad)
     if name == "disagreement: a later certificate":
         said = "\n".join(audit(bad, replays=0).reasons)
     assert said, "certified"
@@ -157,7 +143,7 @@ def test_an_object_that_no_hand_touches_is_not_certified(
 )
 def test_what_says_the_same_stays_certified(bad: Path, vary: Falsify) -> None:
     vary(bad)
-    assert _refusal(bad) == ""
+    assert refusal(bad) == ""
 
 
 def test_a_trusted_task_judges_and_says_what_the_folder_says_otherwise(good: Path, bad: Path, tmp_path: Path) -> None:
