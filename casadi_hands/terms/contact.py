@@ -81,6 +81,13 @@ GRIP = Term(
     "m·g",
     weights={"refine": Weight(0.05, "knot")},
 )
+GROUND_LOAD = Term(
+    "ground_load",
+    "The ground's normal force, whose friction along a line or a face resists turns that are not planned to be",
+    "",
+    "m·g",
+    weights={"refine": Weight(0.5, "knot")},
+)
 FRICTION_MARGIN = Term(
     "friction_margin",
     "Fourth power of the friction in use",

@@ -216,6 +216,7 @@ def ground_contact(kind: type[Body]) -> Kernel:
     _hold(kernel, exerted, friction, (limits.GROUND_PRESSING, limits.GROUND_CONE))
     kernel.cost(contact.STAY_POINT, point - wanted_point)
     kernel.cost(contact.STAY_FORCE, force - wanted_force)
+    kernel.cost(contact.GROUND_LOAD, exerted[2])
     return kernel
 
 
