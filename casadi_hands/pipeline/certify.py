@@ -50,9 +50,9 @@ class Certifier:
     def run(self, found: Found) -> Design:
         """Refine the best hand, the next best, then hands with one more joint where those failed.
 
-        A hand whose files hold and whose replays don't makes way for the next best of its structure that does better.
-        All hands of a structure are tried only where no finger may have another joint, or where even those whose files
-        hold drop the object more often than not. The record's best design, which may be one from before, is returned.
+        A hand whose files or replays don't hold makes way for the next best of its structure. All of them are tried
+        only where no finger may have another joint, and hands whose files hold drop the object more often than not. The
+        record's best design, which may be one from before, is returned.
 
         Args:
             found: by the search.
@@ -65,7 +65,7 @@ class Certifier:
             failing: set[str] = set()
             fewest = np.inf  # share of replays that drop the object, of a hand whose files hold
             for k, candidate in enumerate(found.candidates):
-                may_grow = fewest == np.inf and self._more_joints(found, failing) is not None
+                may_grow = self._more_joints(found, failing) is not None
                 if k >= HANDS_REFINED and (fewest <= LONG_DROPS or may_grow):
                     break
                 judged, refined = self._certify(candidate, short)
@@ -79,7 +79,7 @@ class Certifier:
                 if refined.barely_rolls:
                     break  # a structure that must slip will do so in any of its hands
             least = self._more_joints(found, failing)
-            if fewest < np.inf or least is None:
+            if least is None:
                 return best
             self.record.log("synthesis", f"another joint for {', '.join(sorted(failing)) or 'the fingers with fewest'}")
             found = run_search(self.record, self.model, self.search, least)

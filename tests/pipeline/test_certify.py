@@ -93,12 +93,18 @@ def test_a_certified_hand_that_drops_the_object_makes_way_for_one_that_drops_it_
     cases = (([12, 0], 2, 2), ([12, 5], 2, 2), ([5, 12], 1, 2), ([2, 0], 2, 2), ([1, 0], 1, 1))
     # Those that drop it more often than not make way for all the others.
     for dropped, best, tried in (*cases, ([12, 7, 3], 3, 3), ([12, 7, 8], 2, 3), ([8, 6, 0], 2, 2)):
-        loop = Loop(monkeypatch, 3 * [(0, (), False)], max_joints=3)
+        loop = Loop(monkeypatch, 3 * [(0, (), False)], max_joints=1)
         loop.dropped = dropped
         assert loop.run(found((1, 1), (1, 1), (1, 1))).reason == f"attempt {best}"
         assert len(loop.tried) == tried
-    # Another structure is not tried: it would be no better held between the same contacts.
     assert loop.least == []
+
+
+def test_where_hands_drop_the_object_fingers_get_another_joint(monkeypatch: pytest.MonkeyPatch) -> None:
+    loop = Loop(monkeypatch, 3 * [(0, (), False)], max_joints=2)
+    loop.dropped = [20, 12, 1]
+    assert loop.run(found((1, 1), (1, 1), (1, 1))).reason == "attempt 3"
+    assert loop.tried == [(1, 1), (1, 1), (2, 2)]
 
 
 def test_the_finger_that_failed_gets_a_joint_until_none_may(monkeypatch: pytest.MonkeyPatch) -> None:
