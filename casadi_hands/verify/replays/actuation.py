@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -13,8 +13,13 @@ from casadi_hands.verify.reading.drive import Drive
 from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.replays.perturb import Perturbation
 
-if TYPE_CHECKING:
-    from casadi_hands.verify.replays.simulation import Plan
+
+class Plan(Protocol):
+    """What the hand is told at every step: (T, J) angles and commands, (T, N) positions of motors or None, all rad."""
+
+    angles: np.ndarray
+    commands: np.ndarray
+    motors: np.ndarray | None
 
 
 class Actuation(Protocol):
