@@ -68,8 +68,9 @@ class Coupler:
             refiner = Refiner(self.record, model, self.judge, self.jobs)
             tried, _ = refiner.certify(begun, (), margin, near=True)
             if tried.status == "certified":
-                found = self.record.update_best(tried)
+                found = tried
                 break
+            self.record.log("refine", f"not with {drives}: {tried.reason}")
         return self._told(found, least, joints)
 
     def _off(self, begun: WholeHand) -> float:

@@ -93,9 +93,7 @@ def scene_drive_problems(folder: Folder, scene: Scene, drive: Drive) -> list[str
         if servo.joint in drive.names:
             springs = shafts[drive.names.index(servo.joint)]
             if servo.stiffness < LEAST_STIFF * springs or servo.damping < 0.0:
-                problems.append(
-                    f"{servo.joint}, at {servo.stiffness:.4g} N·m/rad, is hardly held where it is told to be"
-                )
+                problems.append(f"{servo.joint}, at {servo.stiffness:.4g} N·m/rad, hardly stays where it is told to be")
     for name in drive.names:
         body = scene.bodies.get(name)
         hinges = () if body is None else body.hinges
