@@ -71,7 +71,7 @@ def _torsion(motion: Motion, turns: Array, old: Model, model: Model, between: Ar
 
 def in_columns(motion: Motion, model: Model, values: NDArray[Any]) -> NDArray[Any]:
     """Values (S, C, …) of a motion's contacts in the order of the model's; zero for one that never acts."""
-    names = (*model.contact_names, *(["ground"] if model.ground else []))
+    names = (*model.contact_names, *(["ground"] if model.ground is not None else []))
     result = np.zeros((len(values), len(names), *values.shape[2:]), values.dtype)
     for c, name in enumerate(names):
         if name in motion.contact_names:
