@@ -63,8 +63,8 @@ class Model:
         hinge: from a joint to where the body of its link begins; 0 where links begin in a ball that they share.
         link_length: shortest and longest link.
         joint_limits: lower and upper, rad.
-        torque_limit: of a joint in m·g·length, or inf.
-        speed_limit: of a joint in rad/s, or inf.
+        torque_limit: of a motor in m·g·length, or inf.
+        speed_limit: of a motor in rad/s, or inf.
         force_limit: of each component of a contact force, object frame, in m·g.
         clearance: that bodies which do not touch keep from each other, lengths.
         stiffness: of a joint in m·g·length/rad.
@@ -114,6 +114,16 @@ class Model:
     motors: int = 0
     ratios: tuple[float, float] = (0.1, 2.0)
     own_terms: tuple[OwnTerm, ...] = ()
+
+    @property
+    def joint_torque_limit(self) -> float:
+        """Of a joint with a motor of its own; one that shares motors has no limit of theirs."""
+        return np.inf if self.motors else self.torque_limit
+
+    @property
+    def joint_speed_limit(self) -> float:
+        """Likewise."""
+        return np.inf if self.motors else self.speed_limit
 
     @property
     def contact_names(self) -> tuple[str, ...]:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from casadi_hands.task import Actuator, Task
 
 _FREQUENCY = 200.0  # rad/s, of the motor's inertia on its stiffness
-_STIFFER, _QUICK = 100.0, 500.0  # of motors that share joints: than their springs together; rad/s
+_STIFFER, _QUICK = 100.0, 1000.0  # of motors that share joints: than their springs together; rad/s
 
 
 @dataclass(frozen=True)
@@ -57,19 +57,20 @@ def joint_motors(task: Task, hand: Hand) -> tuple[Motor, ...]:
 def shared_motors(task: Task, hand: Hand) -> tuple[Motor, ...]:
     """The motors that share the joints, each a hundred times as stiff as all springs it pulls at, seen at its shaft.
 
-    They are held at what they are told, with a natural frequency of 500 rad/s, critically damped.
+    They are held at what they are told, with a natural frequency of 1000 rad/s, critically damped.
 
     Args:
         task: names the joints' stiffness.
         hand: with a drive.
     """
     assert hand.drive is not None
-    motors = []
-    for column in zip(*hand.drive.ratios, strict=True):
-        stiffness = _STIFFER * task.actuator.stiffness * sum(ratio**2 for ratio in column)
-        armature = stiffness / _QUICK**2
-        motors.append(Motor(stiffness, 2 * sqrt(stiffness * armature), armature))
-    return tuple(motors)
+    return tuple(shared_motor(task.actuator.stiffness, column) for column in zip(*hand.drive.ratios, strict=True))
+
+
+def shared_motor(stiffness: float, ratios: Sequence[float]) -> Motor:
+    """A motor that turns joints of a stiffness, N·m/rad, by ratios (J,)."""
+    stiff = _STIFFER * stiffness * sum(ratio**2 for ratio in ratios)
+    return Motor(stiff, 2 * stiff / _QUICK, stiff / _QUICK**2)
 
 
 def _motor(actuator: Actuator, finger: Finger, joint: int, bodies: Sequence[Inertial]) -> Motor:

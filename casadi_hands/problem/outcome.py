@@ -18,6 +18,7 @@ from casadi_hands.problem.floating_motion import Floating
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model, sampled_points
 from casadi_hands.problem.motion import Motion
+from casadi_hands.problem.motors import shared_motor
 from casadi_hands.problem.palm_motion import poses_at
 from casadi_hands.problem.placement import (
     in_palm,
@@ -104,10 +105,15 @@ def drive_of(task: Task, model: Model, motion: WholeHand) -> Drive:
         if forces is not None:
             joints = joint_torques(model, replace(motion, force=forces))
             torques = max(torques, float(np.abs(joints @ coupling.ratios).max()))
-    speed = float(np.abs(np.diff(coupling.positions, axis=0) / np.diff(model.schedule.samples)[:, None]).max())
+    speeds = np.diff(coupling.positions, axis=0) / np.diff(model.schedule.samples)[:, None]
+    speed = float(np.abs(speeds).max())
+    # From sample to sample motors go straight: where they change their speed, their rotors ask for torque, too.
+    jolts = np.abs(np.diff(speeds, axis=0, prepend=0.0, append=0.0)).max(axis=0)
+    motors = [shared_motor(actuator.stiffness, column) for column in coupling.ratios.T.tolist()]
+    rotor = max(motor.damping / 2 * jolt for motor, jolt in zip(motors, jolts, strict=True))
     return Drive(
         ratios=tuple(tuple(row) for row in coupling.ratios.tolist()),
         offsets=tuple(coupling.offsets.tolist()),
-        effort=actuator.torque or max(RESERVE * torques, LEAST) * model.units.torque,
+        effort=actuator.torque or max(RESERVE * torques, LEAST) * model.units.torque + float(rotor),
         velocity=actuator.speed or max(RESERVE * speed, LEAST),
     )

@@ -200,3 +200,11 @@ WITHIN_SPEED = Constraint(
     ("speed",),
 )
 ON_PALM = Constraint("on_palm", "eq. 2.25 as a bound", "", "start on the palm", "a larger palm (palm.radius)")
+
+# Motors that share joints.
+MOTOR_TORQUE = replace(
+    WITHIN_TORQUE,
+    cannot="be turned within the motors' torque limit",
+    advice="stronger motors (actuator.torque), more of them (motors), or a lighter object",
+)
+MOTOR_SPEED = replace(WITHIN_SPEED, cannot="be turned within the motors' speed limit")

@@ -74,12 +74,29 @@ def pressing(joints: int, kind: type[Body], soft: bool, motors: int) -> Kernel:
 
 
 @cache
-def motor_motion(motors: int) -> Kernel:
-    """The motors' positions at three knots: smooth."""
+def motor_motion(motors: int, limited: bool) -> Kernel:
+    """The motors' positions at three knots: smooth, and within the speed limit if there is one."""
     kernel = Kernel("motor_motion")
     positions = [kernel.variable(f"motors{i}", motors, "motors", i) for i in range(3)]
     steps = [kernel.parameter(f"step{i}", 1, "step", i) for i in range(2)]
     kernel.cost(finger.MOTOR_ACCELERATION, derivative(positions, steps))
+    if limited:
+        speeds = [(positions[i + 1] - positions[i]) / steps[i] for i in range(2)]
+        kernel.constrain(limits.MOTOR_SPEED, ca.vertcat(*speeds))
+    return kernel
+
+
+@cache
+def motor_torque(joints: tuple[int, ...], motors: int) -> Kernel:
+    """The torques of all motors at one knot, by virtual work of the springs of all fingers' joints."""
+    kernel = Kernel("motor_torque")
+    positions, stiffness = kernel.variable("motors", motors), kernel.parameter("stiffness")
+    total = SX.zeros(motors, 1)
+    for i, n in enumerate(joints):
+        ratios = ca.reshape(kernel.variable(f"ratios{i}", n * motors, "ratios", i), motors, n)
+        stretch = kernel.variable(f"offsets{i}", n, "offsets", i) + ca.mtimes(ratios.T, positions)
+        total += stiffness * ca.mtimes(ratios, stretch - kernel.variable(f"angles{i}", n, "angles", i))
+    kernel.constrain(limits.MOTOR_TORQUE, total)
     return kernel
 
 
@@ -118,7 +135,20 @@ def bind(of: Declaration) -> None:
             )
     first = np.arange(of.knots - 2)
     three = [of.motors.take(first + offset) for offset in range(3)]
-    problem.bind(motor_motion(count), motors=three, step=of.steps(first, first + 1))
+    torque, speed = structure.model.torque_limit, structure.model.speed_limit
+    kernel = motor_motion(count, bool(np.isfinite(speed)))
+    of.bind(first, kernel, {"speed": (-speed, speed)}, motors=three, step=of.steps(first, first + 1))
+    if np.isfinite(torque):
+        every = np.arange(of.knots)
+        of.bind(
+            every,
+            motor_torque(structure.joints, count),
+            {"torque": (-torque, torque)},
+            motors=of.motors,
+            angles=of.angles,
+            stiffness=problem["stiffness"],
+            **{name: [rows[name].constant(of.knots) for rows in of.lines] for name in ("ratios", "offsets")},
+        )
 
 
 def constraint_bounds(of: Declaration, what: str) -> dict[str, tuple[ArrayLike, ArrayLike]]:

@@ -14,7 +14,7 @@ from casadi_hands.stages.refine.declaration import FREE, IN_CONE, Bounds, Declar
 def bind_contact(of: Declaration, i: int) -> None:
     """A finger's contact: on both surfaces, in its cone, actuated, also under the task's disturbances."""
     structure = of.structure
-    c, n, torque = structure.contacts[i], structure.joints[i], structure.model.torque_limit
+    c, n, torque = structure.contacts[i], structure.joints[i], structure.model.joint_torque_limit
     kind = type(structure.model.touched[c])
     point, force = (rows.entries(3 * i, 3 * i + 3, c) for rows in (of.point, of.force))
     # The torque is bound only where the task limits it.
@@ -151,7 +151,7 @@ def bind_clearance(of: Declaration, i: int) -> None:
 def bind_shape(of: Declaration, i: int) -> None:
     """A finger's morphology, and its joints' motion: mirrored at both ends, so that it starts and ends at rest."""
     problem, structure, model, count = of.problem, of.structure, of.structure.model, of.knots
-    c, n, speed = structure.contacts[i], structure.joints[i], model.speed_limit
+    c, n, speed = structure.contacts[i], structure.joints[i], model.joint_speed_limit
     inner = np.arange(-1, count + 1)
     mirrored = np.where(inner < 0, 1, np.where(inner >= count, count - 2, inner))
     three = [of.angles[i].take(mirrored[offset : offset + count]) for offset in range(3)]
