@@ -60,7 +60,7 @@ def pressing(joints: int, kind: type[Body], soft: bool, motors: int) -> Kernel:
     scene, stiffness = Scene.declare(kernel, kind), kernel.parameter("stiffness")
     touch = scene.touch(pose, point, angles, symbols)
     # Where the force acts on the link: its own surface, which may be a little off the object's.
-    from_axis = Segment(SX.zeros(3, 1), ca.vertcat(0, 0, symbols.lengths[-1])).offset(touch.on_link)
+    from_axis = Segment(ca.vertcat(0, 0, scene.hinge), ca.vertcat(0, 0, symbols.lengths[-1])).offset(touch.on_link)
     on_surface = touch.on_link - from_axis + scene.radius * touch.link_normal
     here = symbols.placed(angles, scene.radius, on_surface)
     torque = ca.mtimes(here.jacobian.T, ca.mtimes(touch.rotation, force))
