@@ -86,7 +86,7 @@ GROUND_LOAD = Term(
     "The ground's normal force, whose friction along a line or a face resists turns that are not planned to be",
     "",
     "m·g",
-    weights={"refine": Weight(5.0, "knot")},
+    weights={"refine": Weight(2.0, "knot")},
 )
 FRICTION_MARGIN = Term(
     "friction_margin",
