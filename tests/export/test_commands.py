@@ -14,7 +14,7 @@ from casadi_hands.export.mjcf import scene_mjcf
 from casadi_hands.export.urdf import hand_urdf
 from casadi_hands.problem.motion import Motion
 from tests.export.example import example_hand, example_motion, example_task
-from tests.export.test_urdf import odd_hand
+from tests.export.test_urdf import chain, odd_hand
 
 SAMPLES = 9
 
@@ -79,6 +79,25 @@ def test_torques_are_the_transposed_jacobians_times_the_forces(links):
     found = joint_torques(hand, motion)
     assert np.abs(found).max() > 0.01
     np.testing.assert_allclose(found, pinocchio_torques(hand, motion), atol=1e-12)
+
+
+def test_torques_of_bent_fingers_do_the_forces_virtual_work():
+    """Where one joint turns a little, its torque's work is that of the forces on the way that their points go."""
+    hand, links = odd_hand(), ["finger0_link2", "finger1_link0", "finger2_link1"]
+    motion, h = random_motion(hand, links), 1e-6
+    found = joint_torques(hand, motion)
+
+    def points(s, angles):
+        palm = Rotation.from_quat(motion.base_orientation[s], scalar_first=True)
+        poses = [chain(hand, angles)[link] for link in links]
+        on_link = motion.contact_point_link[s]
+        return [palm.apply(at + turn @ point) for (turn, at), point in zip(poses, on_link, strict=True)]
+
+    for s in range(SAMPLES):
+        for j, step in enumerate(h * np.eye(6)):
+            ahead, behind = (points(s, motion.joint_angles[s] + sign * step) for sign in (1, -1))
+            work = ((np.array(ahead) - behind) * motion.contact_force[s]).sum()
+            assert found[s, j] == pytest.approx(work / (2 * h), abs=1e-9)
 
 
 def test_torques_of_the_example_squeeze_and_lift():

@@ -12,7 +12,7 @@ from casadi_hands.export.mjcf import scene_mjcf
 from casadi_hands.export.urdf import hand_urdf
 from casadi_hands.task import parse_task
 from tests.export.example import TASK, example_hand, example_motion, example_task
-from tests.export.test_urdf import odd_hand
+from tests.export.test_urdf import chain, odd_hand
 
 
 def scene(task=None, motion=None):
@@ -97,6 +97,22 @@ def test_bodies_stand_at_the_start_as_in_the_urdf():
                 body = data.body(f"finger{i}_link{j}")
                 assert body.xpos == pytest.approx(pose.translation, abs=1e-12)
                 assert body.xmat.reshape(3, 3) == pytest.approx(pose.rotation, abs=1e-12)
+
+
+def test_bent_links_stand_in_the_scene_as_written_out_by_hand():
+    hand, motion = odd_hand(), example_motion()
+    angles = np.random.default_rng(2).uniform(-1, 1, (len(motion.time), 6))
+    motion = replace(motion, joint_angles=angles, joint_names=hand.joint_names, contact_link=("finger0_link0",) * 3)
+    model = mujoco.MjModel.from_xml_string(scene_mjcf(example_task(), hand, motion))
+    data = mujoco.MjData(model)
+    palm = pin.SE3(pin.Quaternion(*motion.base_orientation[0]), motion.base_position[0])
+    for row in angles[[0, 7]]:
+        for name, angle in zip(hand.joint_names, row, strict=True):
+            data.joint(name).qpos = angle
+        mujoco.mj_kinematics(model, data)
+        for name, (rotation, position) in chain(hand, row).items():
+            assert data.body(name).xpos == pytest.approx(palm.act(position), abs=1e-12)
+            assert data.body(name).xmat.reshape(3, 3) == pytest.approx(palm.rotation @ rotation, abs=1e-12)
 
 
 def test_loaded_and_not_reset_no_finger_is_in_the_object():

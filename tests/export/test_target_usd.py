@@ -1,6 +1,7 @@
 """The OpenUSD files as USD itself sees them."""
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from casadi_hands.export.targets import export_design
 from casadi_hands.problem.inertia import link_inertial, palm_inertial
 from casadi_hands.problem.motors import joint_motors
 from tests.export.example import example_design
+from tests.export.test_urdf import chain
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +57,18 @@ def turn(quaternion):
     return Rotation.from_quat([quaternion.GetReal(), *quaternion.GetImaginary()], scalar_first=True)
 
 
+def joint_frames(stage, prim):
+    """Rotation and position of a joint's frames on both of its bodies in the stage's world."""
+    joint, frames = UsdPhysics.Joint(prim), []
+    for body, local, place in (
+        (joint.GetBody0Rel(), joint.GetLocalRot0Attr(), joint.GetLocalPos0Attr()),
+        (joint.GetBody1Rel(), joint.GetLocalRot1Attr(), joint.GetLocalPos1Attr()),
+    ):
+        at, origin = pose(stage.GetPrimAtPath(body.GetTargets()[0]))
+        frames.append((at * turn(local.Get()), origin + at.apply(np.array(place.Get()))))
+    return frames
+
+
 def test_units_are_those_of_the_design(out):
     for name in ("hand", "object", "scene"):
         stage = Usd.Stage.Open(str(out / f"{name}.usda"))
@@ -92,18 +106,34 @@ def test_links_stand_where_the_motion_starts(hand, design):
     assert (rotation * start.inv()).magnitude() < 1e-6
     for j, name in enumerate(design.hand.joint_names):
         prim = joints(hand)[name]
-        joint, frames = UsdPhysics.Joint(prim), []
-        for body, local, place in (
-            (joint.GetBody0Rel(), joint.GetLocalRot0Attr(), joint.GetLocalPos0Attr()),
-            (joint.GetBody1Rel(), joint.GetLocalRot1Attr(), joint.GetLocalPos1Attr()),
-        ):
-            at, origin = pose(hand.GetPrimAtPath(body.GetTargets()[0]))
-            frames.append((at * turn(local.Get()), origin + at.apply(np.array(place.Get()))))
+        frames = joint_frames(hand, prim)
         between = (frames[0][0].inv() * frames[1][0]).as_rotvec()
         np.testing.assert_allclose(between, [design.motion.joint_angles[0, j], 0.0, 0.0], atol=1e-5)
         np.testing.assert_allclose(frames[0][1], frames[1][1], atol=1e-6)
         for word in ("newton:angular:position", "state:angular:physics:position"):
             assert np.radians(prim.GetAttribute(word).Get()) == pytest.approx(between[0], abs=1e-5)
+
+
+def test_bent_links_stand_where_their_turns_take_them(tmp_path):
+    design, bends = example_design(), iter([(0.3, -1.2), (-0.9, 0.4), (0.0, 0.0), (1.4, 1.0), (-0.2, -0.5), (0.0, 1.5)])
+    fingers = tuple(
+        replace(finger, links=tuple(replace(link, bend=next(bends)) for link in finger.links))
+        for finger in design.hand.fingers
+    )
+    design = replace(design, hand=replace(design.hand, fingers=fingers))
+    design.save(tmp_path / "design")
+    stage = Usd.Stage.Open(str(export_design(tmp_path / "design", "usd") / "hand.usda"))
+    found, palm = bodies(stage), Rotation.from_quat(design.motion.base_orientation[0], scalar_first=True)
+    for name, (rotation, position) in chain(design.hand, design.motion.joint_angles[0]).items():
+        turned, place = pose(found[name])
+        assert (turned.inv() * palm * Rotation.from_matrix(rotation)).magnitude() < 1e-6
+        np.testing.assert_allclose(place, design.motion.base_position[0] + palm.apply(position), atol=1e-6)
+    # Their joints' frames, which the converter takes from the URDF, agree with where the bodies stand.
+    for j, name in enumerate(design.hand.joint_names):
+        one, other = joint_frames(stage, joints(stage)[name])
+        between = (one[0].inv() * other[0]).as_rotvec()
+        np.testing.assert_allclose(between, [design.motion.joint_angles[0, j], 0.0, 0.0], atol=1e-5)
+        np.testing.assert_allclose(one[1], other[1], atol=1e-6)
 
 
 def test_the_palm_is_fixed_to_the_world(hand, design):

@@ -36,14 +36,16 @@ fingers:
 
 
 def odd_hand() -> Hand:
-    """Fingers of three, one and two joints about arbitrary axes."""
+    """Fingers of three, one and two joints about arbitrary axes, of bent links but for one."""
     rng = np.random.default_rng(4)
+    bends = iter([(0.3, -1.2), (-0.9, 0.4), (0.0, 0.0), (1.4, 1.0), (-0.2, -0.5), (0.0, np.pi / 2)])
 
     def finger(name, joints):
         links = []
         for _ in range(joints):
             axis = rng.normal(size=3)
-            links.append(Link(float(rng.uniform(0.02, 0.08)), 0.007, tuple(axis / np.linalg.norm(axis))))
+            axis /= np.linalg.norm(axis)
+            links.append(Link(float(rng.uniform(0.02, 0.08)), 0.007, tuple(axis), next(bends)))
         return Finger(name, (*rng.uniform(-0.03, 0.03, 2), 0.0), tuple(links))
 
     return Hand(0.05, 0.01, (finger("a", 3), finger("b", 1), finger("c", 2)), -1.2, 1.4, 0.8, 5.0, 1200.0)
@@ -57,12 +59,14 @@ def turn(axis, angle):
 
 
 def chain(hand, angles):
-    """Pose of every link in the palm, written out by hand: turn about the axis, go on along z."""
+    """Pose of every link in the palm, written out by hand: bend, turn about the axis, go on along z."""
     poses, remaining = {}, iter(angles)
     for i, finger in enumerate(hand.fingers):
         rotation, position = np.eye(3), np.array(finger.base)
         for j, link in enumerate(finger.links):
-            rotation = rotation @ turn(link.axis, next(remaining))
+            size = np.hypot(*link.bend)
+            bend = turn(np.array([*link.bend, 0.0]) / size, size) if size else np.eye(3)
+            rotation = rotation @ bend @ turn(link.axis, next(remaining))
             poses[f"finger{i}_link{j}"] = (rotation, position)
             position = position + link.length * rotation[:, 2]
     return poses
@@ -120,6 +124,18 @@ def test_mujoco_reads_the_same_kinematics(angles):
         assert data.body(name).xpos == pytest.approx(position, abs=1e-12)
     palm = 1200 * np.pi * 0.05**2 * 0.01
     assert model.body("palm").mass[0] == pytest.approx(palm)
+
+
+def test_a_straight_link_is_not_turned_and_a_bent_one_by_roll_pitch_and_yaw():
+    robot = ElementTree.fromstring(hand_urdf(odd_hand()))
+    turns = {joint.get("name"): joint.find("origin").get("rpy") for joint in robot.findall("joint")}
+    assert turns["finger0_joint2"] == "0 0 0"
+    for i, finger in enumerate(odd_hand().fingers):
+        for j, link in enumerate(finger.links):
+            roll, pitch, yaw = map(float, turns[f"finger{i}_joint{j}"].split())
+            found = turn((0, 0, 1), yaw) @ turn((0, 1, 0), pitch) @ turn((1, 0, 0), roll)
+            x, y = link.bend
+            np.testing.assert_allclose(found, Rotation.from_rotvec([x, y, 0]).as_matrix(), atol=1e-12)
 
 
 def test_a_segment_is_a_capsule_from_its_joint_to_the_next(tmp_path):

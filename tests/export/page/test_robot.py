@@ -6,6 +6,7 @@ import pytest
 from casadi_hands.export.page.robot import Robot
 from casadi_hands.export.urdf import hand_urdf, object_urdf
 from tests.export.example import BASES, LENGTHS, example_hand, example_motion, example_task
+from tests.export.test_urdf import chain, odd_hand
 
 
 def test_links_hang_in_chains_from_the_palm():
@@ -30,6 +31,14 @@ def test_link_poses_are_those_of_a_planar_arm():
         elbow = np.array(base) + LENGTHS[0] * np.array([0.0, -np.sin(angle), np.cos(angle)])
         assert poses[f"finger{i}_link0"][:3, 3] == pytest.approx(base)
         assert poses[f"finger{i}_link1"][:3, 3] == pytest.approx(elbow, abs=1e-12)
+
+
+def test_bent_links_stand_where_their_turns_take_them():
+    hand, angles = odd_hand(), np.random.default_rng(1).uniform(-1, 1, 6)
+    poses = Robot(hand_urdf(hand)).link_poses(dict(zip(hand.joint_names, angles, strict=True)))
+    for name, (rotation, position) in chain(hand, angles).items():
+        np.testing.assert_allclose(poses[name][:3, :3], rotation, atol=1e-12)
+        np.testing.assert_allclose(poses[name][:3, 3], position, atol=1e-12)
 
 
 def test_shapes_are_those_exported():
