@@ -67,6 +67,21 @@ def test_a_design_comes_back_as_it_was(saved):
     assert loaded.motion.contact_force_disturbed is None
 
 
+def test_bent_links_come_back_as_they_were_and_straight_ones_of_earlier_folders(tmp_path):
+    design, bends = example_design(), iter([(0.1, -0.2), (1.2, 0.7), (-1e-17, np.pi / 2), (0.0, 0.0), (0.3, 0), (0, 1)])
+    fingers = tuple(
+        replace(finger, links=tuple(replace(link, bend=tuple(map(float, next(bends)))) for link in finger.links))
+        for finger in design.hand.fingers
+    )
+    replace(design, hand=replace(design.hand, fingers=fingers)).save(tmp_path)
+    assert Design.load(tmp_path).hand.fingers == fingers
+    content = record(tmp_path)
+    for finger, built in zip(content["hand"]["fingers"], fingers, strict=True):
+        assert [tuple(link.pop("bend")) for link in finger["links"]] == [link.bend for link in built.links]
+    (tmp_path / "result.json").write_text(json.dumps(content))
+    assert Design.load(tmp_path).hand.fingers == design.hand.fingers
+
+
 def test_disturbed_forces_come_back_as_they_were(tmp_path):
     design, rng = example_design(), np.random.default_rng(0)
     disturbed = {
@@ -120,7 +135,7 @@ def test_the_record_says_what_the_format_says(saved):
     assert result["hand"]["palm"] == {"radius": 0.06, "thickness": 0.012}
     index = result["hand"]["fingers"][1]
     assert (index["name"], index["base"]) == ("index", [0.02, 0.045, 1.05 * 0.008])
-    assert index["links"][1] == {"length": 0.08, "radius": 0.008, "axis": [1, 0, 0]}
+    assert index["links"][1] == {"length": 0.08, "radius": 0.008, "axis": [1, 0, 0], "bend": [0, 0]}
     assert {"casadi-hands", "casadi", "pin", "numpy"} <= set(result["versions"])
     assert result["certificate"]["slip"]["holds"] is False
     assert result["costs"]["whole_hand"]["torque"] == {"weight": 0.05, "value": 1.25}
