@@ -40,6 +40,13 @@ def test_axes_differ_by_the_angle_between_them(angle: float) -> None:
     assert difference(example_hand(), with_axis(turned), LENGTH) == pytest.approx(angle, rel=1e-6)
 
 
+def test_bends_differ_by_their_distance() -> None:
+    first, second = example_hand().fingers[2].links
+    hands = [changed(2, links=(first, replace(second, bend=bend))) for bend in ((0.5, 0.1), (0.2, -0.3))]
+    assert difference(*hands, LENGTH) == pytest.approx(0.5)
+    assert difference(example_hand(), hands[1], LENGTH) == pytest.approx(math.hypot(0.2, 0.3))
+
+
 def test_an_axis_turned_around_is_the_same_axis() -> None:
     turned = Rotation.from_rotvec([0, 0, 0.25]).apply([-1, 0, 0])
     assert difference(example_hand(), with_axis(turned), LENGTH) == pytest.approx(0.25)
