@@ -472,6 +472,59 @@ SPOILT = {
         "hand: {joint_limits: [-200, 90]}\nname:",
         "1: hand.joint_limits: given [-200, 90]; allowed: [lower, upper]...",
     ),
+    "bend below straight": (
+        "name:",
+        "hand: {bend: -5}\nname:",
+        "1: hand.bend: given -5; allowed: a number of at least 0",
+    ),
+    "bend back onto the link before": (
+        "name:",
+        "hand: {bend: 150}\nname:",
+        "1: hand.bend: given 150; allowed: a number of at most 120",
+    ),
+    "bend in words": (
+        "name:",
+        "hand: {bend: none}\nname:",
+        "1: hand.bend: given 'none'; allowed: a number (without quotes or unit; ...)",
+    ),
+    "angles of axes reversed": (
+        "name:",
+        "hand: {axes: {from_link: [90, 60]}}\nname:",
+        (
+            "1: hand.axes.from_link: given [90, 60]; allowed: [least, largest] in degrees with "
+            "0 <= least < largest <= 90"
+        ),
+    ),
+    "one angle of axes alone": (
+        "name:",
+        "hand: {axes: {from_link: [75, 75]}}\nname:",
+        "1: hand.axes.from_link: given [75, 75]; allowed: [least, largest] in degrees...",
+    ),
+    "angles of axes beyond across": (
+        "name:",
+        "hand: {axes: {from_link: [60, 100]}}\nname:",
+        "1: hand.axes.from_link: given [60, 100]; allowed: [least, largest] in degrees...",
+    ),
+    "angle of axes below along": (
+        "name:",
+        "hand: {axes: {from_link: [-10, 60]}}\nname:",
+        "1: hand.axes.from_link: given [-10, 60]; allowed: [least, largest] in degrees...",
+    ),
+    "least angle of axes only": (
+        "name:",
+        "hand: {axes: {from_link: 60}}\nname:",
+        "1: hand.axes.from_link: given 60; allowed: a list of 2 numbers",
+    ),
+    "angles of axes without a name": (
+        "name:",
+        "hand: {axes: [60, 90]}\nname:",
+        "1: hand.axes: given [60, 90]; allowed: ...from_link...",
+    ),
+    "misspelt angles of axes": (
+        "name:",
+        "hand: {axes: {from_links: [60, 90]}}\nname:",
+        "1: hand.axes.from_links: given an unknown field; allowed: ...from_link...",
+    ),
     "motor that gives way to everything": (
         "name:",
         "actuator: {stiffness: 0}\nname:",
