@@ -106,7 +106,8 @@ def test_straight_seeds_with_free_axes_are_drawn_from_the_stream_as_ever(target:
 
 def test_bends_cover_their_disc_evenly(target: Target) -> None:
     for bend, most in ((90, 45), (30, 30)):  # seeds start bent by no more than 45 degrees
-        bends = np.vstack([draw(allowing(target, bend, 60, 90), (8, trial)).bends for trial in range(200)])
+        wanted = allowing(target, bend, 60, 90)
+        bends = np.vstack([draw(wanted, (8, trial)).bends for trial in range(200)])
         shares = (np.degrees(np.linalg.norm(bends, axis=1)) / most) ** 2
         ways = np.arctan2(bends[:, 1], bends[:, 0]) / (2 * np.pi) + 0.5
         assert kstest(shares, "uniform").pvalue > 0.01
