@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import casadi as ca
 import numpy as np
+import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.kinematics.numeric import contact_kinematics
-from casadi_hands.kinematics.symbols import axis, tip_point
+from casadi_hands.kinematics.symbols import axes_of, axis, bent, cosines_from_links, tip_point, turns_of
 from tests.stages.example import PinFinger, everything, made_up_finger, project
 
 LENGTH, RADIUS = 0.7, 0.2
@@ -38,6 +39,52 @@ def test_axis_is_unit_and_leans_towards_its_coordinates() -> None:
         expected = frame @ Rotation.from_rotvec([-y, x, 0]).apply([0, 0, 1])
         np.testing.assert_allclose(found, expected, atol=1e-5)
         assert np.linalg.norm(found) == pytest.approx(1, abs=1e-9)
+
+
+@pytest.mark.parametrize("bend", [[0, 0], [1e-7, 0], [0.3, -0.2], [0, np.pi / 2], [-1.5, 1.4]])
+def test_bent_is_the_rotation_of_its_vector(bend: list[float]) -> None:
+    found = np.asarray(ca.evalf(bent(ca.SX(ca.DM(bend)))))
+    # The angle is rounded off at zero, by 1e-5 rad.
+    np.testing.assert_allclose(found, pin.exp3(np.array([*bend, 0.0])), atol=1e-9)
+    np.testing.assert_allclose(found.T @ found, np.eye(3), atol=2e-9)
+
+
+def test_turns_of_a_seed_are_those_of_the_symbols() -> None:
+    seed = made_up_finger(everything()[1], 3, 1, 7)
+    found = np.asarray(ca.evalf(turns_of(ca.SX(ca.DM(seed.bends.ravel())))))
+    assert found.shape == (3, 9)
+    np.testing.assert_allclose(found, np.hstack(list(seed.turns)), atol=1e-9)
+    np.testing.assert_allclose(seed.turns, [pin.exp3(np.array([*bend, 0.0])) for bend in seed.bends], atol=1e-12)
+
+
+@pytest.mark.parametrize("joints", [1, 2, 3])
+def test_cosines_are_those_of_axes_and_links_that_pinocchio_has(joints: int) -> None:
+    seed = made_up_finger(everything()[1], joints, 1, 8)
+    model, parent = pin.Model(), 0
+    for axis_, bend in zip(PinFinger(seed, RADIUS).axes, seed.bends, strict=True):
+        place = pin.SE3(pin.exp3(np.array([*bend, 0.0])), np.zeros(3))
+        parent = model.addJoint(parent, pin.JointModelRevoluteUnaligned(axis_), place, f"j{parent}")
+    data, angles = model.createData(), np.random.default_rng(0).uniform(-1, 1, joints)
+    # Whatever the angles: an axis stands in its link and in the one before as they are turned about it.
+    pin.computeJointJacobians(model, data, angles)
+    axes = [pin.getJointJacobian(model, data, j + 1, pin.WORLD).reshape(6, joints)[3:, j] for j in range(joints)]
+    links = [data.oMi[j + 1].rotation[:, 2] for j in range(joints)]
+    expected = [a @ b for a, b in zip(axes, links, strict=True)] + [
+        a @ b for a, b in zip(axes[1:], links, strict=False)
+    ]
+    frames = ca.SX(ca.DM(seed.frames.transpose(0, 2, 1).ravel()))
+    symbols = axes_of(ca.SX(ca.DM(seed.axes.ravel())), frames), turns_of(ca.SX(ca.DM(seed.bends.ravel())))
+    found = np.asarray(ca.evalf(cosines_from_links(*symbols))).ravel()
+    np.testing.assert_allclose(found, expected, atol=1e-6)
+
+
+def test_derivatives_of_a_bend_are_finite_where_the_link_is_straight() -> None:
+    x = ca.SX.sym("x", 2)
+    jacobian = ca.jacobian(ca.vec(bent(x)), x)
+    first, second = (np.asarray(v) for v in ca.Function("f", [x], [jacobian, ca.jacobian(ca.vec(jacobian), x)])([0, 0]))
+    assert np.isfinite(second).all()
+    for k, generator in enumerate(np.eye(3)[:2]):
+        np.testing.assert_allclose(first[:, k].reshape(3, 3).T, pin.skew(generator), atol=1e-9)
 
 
 def test_derivatives_are_finite_at_the_pole_and_at_the_seed_axis() -> None:
