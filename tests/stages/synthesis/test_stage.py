@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from casadi_hands.kinematics.morphology import FingerSeed
 from casadi_hands.nlp import Options
 from casadi_hands.problem.model import Model
+from casadi_hands.problem.si import build_model
+from casadi_hands.stages.synthesis.seeds import random_finger
 from casadi_hands.stages.synthesis.stage import Synthesised, SynthesisStage
 from casadi_hands.stages.synthesis.target import Target, target_of
-from casadi_hands.task import Task
+from casadi_hands.task import Task, parse_task
 from tests.stages.example import (
     PinFinger,
     check_derivatives,
     doubling_each_weight,
     everything,
+    everything_text,
+    folds_apart,
     g,
     linear_at,
     made_up_finger,
@@ -31,6 +36,7 @@ Array = np.ndarray
 MARGIN = 0.03  # clearance asked of what need not touch, lengths
 JOINTS = (1, 2, 3)
 BENDS = (1.8, 1.8, 0.4)  # rad: two beyond the joint limits, one straight into the object
+FOLDED = (1.5, 0.0)  # rad, of a link that its joint then folds onto the one before
 TERMS = {
     "bend",
     "tip_target",
@@ -49,7 +55,7 @@ class Witness:
     """The terms, unweighted, of some fingers together."""
 
     def __init__(self, model: Model, target: Target, fingers: tuple[FingerSeed, ...]) -> None:
-        self.model, self.target, self.fingers, self.deepest = model, target, fingers, 0.0
+        self.model, self.target, self.fingers, self.deepest, self.folded = model, target, fingers, 0.0, 0.0
         self.pins = [PinFinger(seed, model.link_radius) for seed in fingers]
         self.collision_times = np.unique(
             np.concatenate([np.linspace(a, b, 4) for a, b in zip(target.times[:-1], target.times[1:], strict=True)])
@@ -121,6 +127,9 @@ class Witness:
                     for i in range(len(chain))
                     for j in range(i + 2, len(chain))
                 ]
+                folds = folds_apart(chain, radius)
+                apart += folds
+                self.folded = max([self.folded, *(MARGIN - fold for fold in folds)])
                 for capsule in rods(self.model.bodies, bodies[t]):
                     gaps = [segments_apart(*link, capsule[:3], capsule[3:6]) - radius - capsule[6] for link in chain]
                     apart += gaps[:-1]
@@ -147,11 +156,13 @@ class Case:
         )
         self.fingers[1].lengths[0] = 0.5 * self.model.link_length[0]
         self.fingers[0].base[:] = [0.9, -0.8]
+        self.fingers[1].bends[1] = FOLDED
         self.weights = dict(self.task.weights.synthesis)
         witness = Witness(self.model, self.target, self.fingers)
         self.expected = witness.terms()
         # A last link is in the object somewhere, or the cost of that would go unseen.
         assert witness.deepest > 0.02
+        assert witness.folded > 0.02
 
     def evaluate(self, weights: dict[str, object], step: int = 2) -> dict[str, float]:
         parameters = {**self.stage._parameters(self.fingers), **self.stage._weights(weights, step)}
@@ -217,6 +228,42 @@ def test_the_last_step_keeps_limits_as_bounds(case: Case, solved: Synthesised) -
         assert finger.angles.max() <= high + 1e-6
         assert finger.lengths.min() >= shortest - 1e-6
         assert finger.lengths.max() <= longest + 1e-6
+
+
+def hinge_angles(fingers: tuple[FingerSeed, ...]) -> tuple[Array, Array]:
+    """Degrees of bends, and of axes from their links and those before them, of all fingers; by SciPy."""
+    bends, off = [], []
+    for finger in fingers:
+        for j, (bend, axis) in enumerate(zip(finger.bends, PinFinger(finger, 1.0).axes, strict=True)):
+            turn = Rotation.from_rotvec([*bend, 0.0])
+            bends.append(np.degrees(turn.magnitude()))
+            beside = [axis, turn.apply(axis)][: 2 if j else 1]
+            off += [np.degrees(np.arctan2(np.hypot(x, y), abs(z))) for x, y, z in beside]
+    return np.array(bends), np.array(off)
+
+
+def test_a_solve_keeps_bends_and_hinges_from_a_start_that_has_them_not(case: Case, solved: Synthesised) -> None:
+    bends, off = hinge_angles(case.fingers)
+    assert bends.max() > 80
+    assert off.min() < 55
+    bends, off = hinge_angles(solved.fingers)
+    assert bends.max() <= 90 + 1e-2
+    assert off.min() >= 60 - 0.1  # to the solver's tolerance of squared cosines
+
+
+@pytest.mark.parametrize(("bend", "least", "largest"), [(20, 89, 90), (0, 60, 90), (15, 0, 10)])
+def test_a_solve_keeps_narrow_ranges(bend: float, least: float, largest: float) -> None:
+    text = everything_text().replace("hand: {", f"hand: {{bend: {bend}, axes: {{from_link: [{least}, {largest}]}}, ")
+    model = build_model(parse_task(text))
+    target = target_of(model, made_up_floating(model))
+    stage, rng = SynthesisStage(target, (1,), (2,)), np.random.default_rng(0)
+    found = stage.solve((random_finger(target, 1, 2, rng),), dict(parse_task(text).weights.synthesis))
+    bends, off = hinge_angles(found.fingers)
+    assert bends.max() <= bend + 1e-2
+    assert off.min() >= least - 0.2
+    assert off.max() <= largest + 0.2
+    if not bend:
+        assert not found.fingers[0].bends.any()
 
 
 def test_the_result_s_terms_are_those_of_its_fingers(case: Case, solved: Synthesised) -> None:
