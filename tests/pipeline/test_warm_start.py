@@ -159,6 +159,23 @@ def test_fingers_of_an_earlier_version_stand_up_and_their_contacts_stay() -> Non
     assert np.abs(found.joint_angles - nearer.joint_angles).max() > 0.03
 
 
+def test_bends_stay_and_bent_fingers_follow_the_object() -> None:
+    # Each first link bent by 20 degrees about its joint's axis, and the joint turned back by as much: the same motion.
+    bend, hand, motion = np.radians(20), example_hand(), example_motion()
+    bent = tuple(replace(f, links=(replace(f.links[0], bend=(bend, 0.0)), f.links[1])) for f in hand.fingers)
+    turned_back = replace(motion, joint_angles=motion.joint_angles - np.tile([bend, 0.0], 3))
+    for changes in ([], [f"position: [{x}, 0, 0.3] -> position: [{x + 0.004:.3f}, 0, 0.3]" for x in (0.075, 0.115)]):
+        text = edited(*changes)
+        earlier_one = Design(parse_task(HELD), "feasible", hand=replace(hand, fingers=bent), motion=turned_back)
+        task, start, found = start_for(text, earlier_one)
+        straight = start_for(text)[2]
+        np.testing.assert_allclose(found.joint_angles, straight.joint_angles - np.tile([bend, 0.0], 3), atol=1e-9)
+        np.testing.assert_allclose(found.contact_point_link, straight.contact_point_link, atol=1e-9)
+        built = hand_of(task, build_model(task), start.fingers, start.contacts, 1.0, 1.0)
+        for finger in built.fingers:
+            assert [link.bend for link in finger.links] == [(bend, 0.0), (0.0, 0.0)]
+
+
 def test_a_contact_moved_moves_its_points_on_the_surface() -> None:
     _, _, found = start_for(edited("[0, 0.02, -0.01] -> [0, 0.02, -0.005]"))
     wanted = example_motion().contact_point_object.copy()
