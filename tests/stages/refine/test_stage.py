@@ -351,6 +351,24 @@ def test_the_margins_are_kept(solved: Solved) -> None:
         assert np.linalg.norm(force - pressing * inward) <= 1.002 * margin.friction * task.friction * pressing
 
 
+def test_links_are_bent_and_joints_hinged_as_the_task_allows(solved: Solved) -> None:
+    least, largest = solved.task.hand.axes.from_link
+    assert (solved.task.hand.bend, least, largest) == (90, 60, 90)
+    assert solved.design.hand is not None
+    seen = []
+    for built, finger in zip(solved.design.hand.fingers, solved.refined.hand.fingers, strict=True):
+        for j, link in enumerate(built.links):
+            np.testing.assert_allclose(link.bend, finger.bends[j], rtol=1e-12)
+            turn = Rotation.from_rotvec([*link.bend, 0.0])
+            assert np.degrees(turn.magnitude()) <= 90 + 1e-4
+            for x, y, z in [link.axis, turn.apply(link.axis)][: 2 if j else 1]:
+                seen.append(np.degrees(np.arctan2(np.hypot(x, y), abs(z))))
+    assert min(seen) >= least - 1e-4
+    assert max(seen) <= largest + 1e-4
+    # Bends are variables: they are used.
+    assert max(np.abs(finger.bends).max() for finger in solved.refined.hand.fingers) > 0.01
+
+
 def test_what_moved_is_told(solved: Solved) -> None:
     # The design is free: how far it went is a figure of the result, from start and end.
     length = solved.model.units.length
@@ -367,6 +385,7 @@ def test_what_moved_is_told(solved: Solved) -> None:
             for a, b in zip(finger.axis_vectors, before.axis_vectors, strict=True)
         ]
         assert moved["axes"] == pytest.approx(max(turned), abs=1e-6)
+        assert moved["bends"] == pytest.approx(np.hypot(*(finger.bends - before.bends).T).max(), rel=1e-9)
     hand = solved.design.hand
     assert hand is not None
     for built, finger in zip(hand.fingers, solved.refined.hand.fingers, strict=True):
