@@ -31,7 +31,7 @@ from tests.stages.example import check_derivatives, everything
 from tests.stages.synthesis.example import BALL
 
 # Two fingers carry a ball 1.5 cm to the side.
-TASK = parse_task(f"name: ball{BALL}search: {{trials: 3, recombinations: 2, max_joints: 2}}\n")
+TASK = parse_task(f"name: ball{BALL}search: {{trials: 6, recombinations: 3, max_joints: 2}}\n")
 EXAMPLE = ROOT / "examples" / "own_cost.py"
 
 
@@ -90,7 +90,7 @@ def test_what_is_reported_is_the_weight_times_the_mean_of_the_residuals_of_the_m
     for term in terms:
         residual = chosen[term.name][1](motion)
         # Contacts are written where they are nearest the surface, which soft stages leave them off a little.
-        close = 2e-2 if term.name == "left" and stage != "floating" else 1e-6
+        close = 5e-2 if term.name == "left" and stage != "floating" else 1e-6
         expected = term.weight * (residual**2).sum(axis=1).mean()
         assert reported[term.name] == {"weight": term.weight, "value": pytest.approx(expected, rel=close)}
     assert reported["total"]["value"] == pytest.approx(0.02 * (motion.contact_force[:, 0] ** 2).sum(axis=1).mean())
