@@ -70,8 +70,9 @@ def test_an_unknown_stage_is_refused() -> None:
 @pytest.fixture(scope="module")
 def carried(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("carried")
-    # Two fingers of two joints each hold the ball no better than the replay's limits; of three they do.
-    solve(parse_task(BALL.replace("max_joints: 2", "max_joints: 3")), jobs=1, out=folder)
+    # Two fingers of two joints each, or with less friction, hold the ball no better than the replay's limits.
+    text = BALL.replace("max_joints: 2", "max_joints: 3").replace("friction: 0.5", "friction: 0.8")
+    solve(parse_task(text), jobs=1, out=folder)
     return folder
 
 
@@ -110,7 +111,9 @@ def check_kinematics(folder: Path) -> None:
         for i, finger in enumerate(hand.fingers):
             own = [angles[names.index(f"finger{i}_joint{j}")] for j in range(len(finger.links))]
             lengths, axes = [link.length for link in finger.links], np.array([link.axis for link in finger.links]).T
-            tip = np.asarray(finger_kinematics(len(own))(finger.base, axes, lengths, own, np.zeros(3))[2]).ravel()
+            turns = np.hstack([pin.exp3(np.array([*link.bend, 0.0])) for link in finger.links])
+            found = finger_kinematics(len(own))(finger.base, turns, axes, lengths, own, np.zeros(3))
+            tip = np.asarray(found[2]).ravel()
             last = data.oMf[model.getFrameId(f"finger{i}_link{len(own) - 1}")]
             np.testing.assert_allclose(last.act(np.array([0, 0, lengths[-1]])), tip, atol=1e-9)
 
@@ -186,9 +189,7 @@ def test_a_contact_out_of_reach_fails_the_task(
 
 
 def test_motors_too_weak_are_named_with_what_they_must_give(tmp_path: Path) -> None:
-    # Of three trials the best hand may be one that needs three times the torque.
-    text = changed("actuator: {torque: 0.0005, speed: 5}").replace("trials: 3", "trials: 6")
-    design = solve(parse_task(text), jobs=1, out=tmp_path)
+    design = solve(parse_task(changed("actuator: {torque: 0.0005, speed: 5}")), jobs=1, out=tmp_path)
     told = told_of(
         design,
         r"joint finger([01])_joint([01]) of finger '(left|right)' needs ([\d.]+) N·m at .* however .*, and the motors "
