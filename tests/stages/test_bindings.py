@@ -100,6 +100,7 @@ BUILD: dict[str, Callable[[], object]] = {
         replace(everything()[1], servo=0.4), (0, 1, 2), (2, 2, 3), palm_moves=True
     ),
     "refine, servos": lambda: refine(replace(everything()[1], servo=0.4), (0, 1, 2), (2, 2, 3)),
+    "refine, shared motors": lambda: refine(replace(everything()[1], motors=2), (0, 1, 2), (2, 2, 3)),
     "refine, drawing": lambda: refine(drawing()[1], (0, 1), (3, 3)),
     "refine, one joint": lambda: refine(drawing()[1], (1, 0), (1, 1)),
 }

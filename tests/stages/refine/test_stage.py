@@ -14,6 +14,9 @@ from scipy.spatial.transform import Rotation
 
 from casadi_hands.export.design import Design
 from casadi_hands.nlp import Options, Solution
+from casadi_hands.pipeline.record import Record
+from casadi_hands.pipeline.steps import adopt
+from casadi_hands.problem.commands import coupled
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.outcome import whole_hand_motion
@@ -36,7 +39,8 @@ from casadi_hands.stages.refine.stage import RefineStage
 from casadi_hands.stages.refine.values import TOOL_TOLERANCE, Margin, RefineValues, longest_run
 from casadi_hands.task import Task, load_task
 from casadi_hands.terms import constraints as limits
-from casadi_hands.verify import Audit, audit_files
+from casadi_hands.verify import Audit, audit_files, replay
+from casadi_hands.verify.reading.folder import read_folder
 from tests.stages.example import STAND, project, rod
 from tests.stages.refining import MadeUp, carrying, sketching
 from tests.stages.searched import whole_hand_of_two_joints
@@ -325,6 +329,27 @@ def test_the_result_is_exact_and_the_audit_certifies_it(solved: Solved) -> None:
     assert solved.verdict.certified
     names = [run.what for run in solved.refined.runs]
     assert (names[0], names[-1]) == ("sparse penalty", "hard constraints")
+
+
+def test_two_motors_turn_its_six_joints_and_move_them_in_the_replay(solved: Solved, tmp_path: Path) -> None:
+    model, hand = replace(solved.model, motors=2), solved.refined.hand
+    begun = coupled(model, hand, 2)
+    refined = Continuation(model, hand.contacts, (2,) * model.contacts, hand.active).solve(begun, Margin(), near=True)
+    assert refined.exact
+    record = Record(solved.task, None, lambda _: None)
+    adopt(record, model, refined.hand)
+    record.design.save(tmp_path)
+    verdict = audit_files(tmp_path)
+    assert verdict.reasons == []
+    assert verdict.figures["coupling"].value < 2e-5
+    found = read_folder(tmp_path)
+    assert found.drive is not None
+    assert found.drive.ratios.shape == (6, 2)
+    told = []
+    played = replay(tmp_path, observer=lambda _, data: told.append(data.ctrl.copy()))
+    assert np.shape(told)[1] == 2
+    assert not played.dropped
+    assert played.position_max < 2e-3
 
 
 def test_the_files_have_the_points_and_forces_that_balance(solved: Solved) -> None:
