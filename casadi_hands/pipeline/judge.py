@@ -124,8 +124,10 @@ class Judge:
                 save_design(design, Path(scratch), page=False)
                 found = audit_files(scratch)
             # How many motors are asked for is counted at last: a hand with more is where fewer are looked for from.
-            others = {name: figure for name, figure in found.figures.items() if name != "motors"}
-            self._last = design.hand, design.motion, replace(found, figures=others)
+            if "motors" in found.figures:
+                others = {name: figure for name, figure in found.figures.items() if name != "motors"}
+                found = replace(found, figures=others)
+            self._last = design.hand, design.motion, found
         return self._last[2]
 
     def _feasible(self, name: str, figure: dict[str, Any]) -> bool:

@@ -1,0 +1,122 @@
+"""How few motors are looked for, and what is said where they are not found; nothing is solved."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from casadi_hands.cli.summary import design_summary
+from casadi_hands.export.design import Design
+from casadi_hands.pipeline import couplings
+from casadi_hands.pipeline.alternatives.ranking import rank
+from casadi_hands.pipeline.couplings import Coupler
+from casadi_hands.pipeline.judge import Judge
+from casadi_hands.pipeline.record import Record, rank_of
+from casadi_hands.problem.coupling import Coupling
+from casadi_hands.problem.drive import Drive
+from tests.export.example import example_hand, example_motion, example_task
+from tests.pipeline.replayed import replayed
+
+OFF = {1: 0.5, 2: 0.3, 3: 0.2, 4: 0.1}  # rad that commands are off so many lines
+
+
+def own_motors(asked: Any) -> Design:
+    """A certified hand with a motor for each of its six joints."""
+    task = example_task().model_copy(update={"motors": asked})
+    design = Design(task, "certified", hand=example_hand(), motion=example_motion())
+    return replayed(replace(design, certificate={"gap": {"value": 0.0, "limit": 1.0, "holds": True}}), 0)
+
+
+def with_motors(design: Design, motors: int) -> Design:
+    assert design.hand is not None
+    drive = Drive(((1.0,) * motors,) * 6, (0.0,) * 6, 1.0, 1.0)
+    return replace(design, hand=replace(design.hand, drive=drive))
+
+
+class Start:
+    """What a coupling begins with."""
+
+    def __init__(self, motors: int) -> None:
+        self.motors = motors
+        self.coupling = Coupling(np.ones((6, motors)), np.zeros(6), np.zeros((2, motors)), tuple(range(motors)))
+
+
+def looked_for(monkeypatch: pytest.MonkeyPatch, asked: Any, works: int) -> tuple[Design, list[int]]:
+    """The design that is handed over, and the numbers of motors tried, where so many and more work."""
+    design, tried = own_motors(asked), list[int]()
+
+    class Refiner:
+        def __init__(self, record: Record, model: Any, judge: Judge, jobs: int) -> None:
+            self.motors = model.motors
+
+        def certify(self, begun: Start, *_: Any, **__: Any) -> tuple[Design, None]:
+            tried.append(self.motors)
+            found = with_motors(design, self.motors)
+            return (found if self.motors >= works else replace(found, status="failed", reason="it slips")), None
+
+    monkeypatch.setattr(couplings, "Refiner", Refiner)
+    monkeypatch.setattr(couplings, "warm_start", lambda *_: None)
+    monkeypatch.setattr(couplings, "kept_margin", lambda *_: None)
+    monkeypatch.setattr(couplings, "coupled", lambda model, whole, motors: Start(motors))
+    monkeypatch.setattr(couplings, "joint_commands", lambda model, begun: np.full((2, 6), OFF[begun.motors]))
+    model: Any = type("Model", (), {"motors": 0})()
+    monkeypatch.setattr(couplings, "replace", _replaced)
+    coupler = Coupler(Record(design.task, None, lambda _: None), model, Judge(model, model), 1)
+    return coupler.run(design), tried
+
+
+def _replaced(value: Any, **changes: Any) -> Any:
+    """As `dataclasses.replace`, also of the made-up model."""
+    return type("Model", (), changes)() if "motors" in changes else replace(value, **changes)
+
+
+def test_the_fewest_that_are_certified_are_taken_from_where_lines_are_near(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, tried = looked_for(monkeypatch, "fewest", works=3)
+    assert tried == [2, 3]
+    assert found.hand is not None
+    assert (found.status, found.hand.motors, found.reason) == ("certified", 3, "")
+
+
+def test_a_number_out_of_reach_is_not_certified_and_the_reason_has_the_fewest(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, tried = looked_for(monkeypatch, 2, works=3)
+    assert tried == [2, 3]
+    assert found.status == "feasible"
+    assert found.reason == "no motion was found with which 2 motors drive all 6 joints; the fewest found is 3"
+    assert found.missed == {"motors"}
+
+
+def test_where_none_share_joints_the_hand_is_kept_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, _ = looked_for(monkeypatch, "fewest", works=9)
+    assert found.hand is not None
+    assert (found.status, found.hand.motors) == ("certified", 6)
+    assert found.reason == "no motion was found with which 4 motors or fewer drive all 6 joints"
+    found, _ = looked_for(monkeypatch, 1, works=9)
+    assert found.status == "feasible"
+    assert found.reason == "no motion was found with which 1 motor drives all 6 joints"
+
+
+@pytest.mark.parametrize("asked", ["independent", 6, 9])
+def test_nothing_is_looked_for_where_every_joint_may_have_its_own(monkeypatch: pytest.MonkeyPatch, asked: Any) -> None:
+    found, tried = looked_for(monkeypatch, asked, works=1)
+    assert tried == []
+    due = own_motors(asked)
+    assert (found.status, found.reason, found.hand, found.missed) == ("certified", "", due.hand, set())
+
+
+def test_fewer_motors_are_better_than_fewer_drops_and_fewer_joints() -> None:
+    own, shared = own_motors("fewest"), with_motors(own_motors("fewest"), 2)
+    assert rank_of(replayed(shared, 1)) < rank_of(replayed(own, 0))
+    assert rank_of(with_motors(own, 1)) < rank_of(shared)
+    assert own.hand is not None
+    fewer_joints = replace(own.hand, fingers=own.hand.fingers[:2])
+    ranked = rank({0: replace(own, hand=fewer_joints), 1: shared, 2: own})
+    assert [each.seed for each in ranked] == [1, 0, 2]
+
+
+def test_the_summary_says_how_many_motors_drive_how_many_joints(tmp_path: Any) -> None:
+    for motors, words in ((1, "1 motor drives 6 joints"), (2, "2 motors drive 6 joints")):
+        lines = [str(part) for part in design_summary(with_motors(own_motors("fewest"), motors), tmp_path).renderables]  # type: ignore[attr-defined]
+        assert f"motors: {words}" in lines
