@@ -24,7 +24,7 @@ def test_motors_and_links_follow_the_servo_and_it_survives_saving(name: str) -> 
     assert (task.actuator.torque, task.actuator.speed) == (servo.continuous, servo.speed)
     assert task.actuator.stiffness == (servo.stiffness or USUAL_STIFFNESS)
     assert task.limits.least_stiffness == task.actuator.stiffness
-    assert task.hand.link_length[0] == pytest.approx(max(2 * task.hand.link_radius, math.dist((0, 0, 0), servo.size)))
+    assert task.hand.link_length[0] == pytest.approx(max(3 * task.hand.link_radius, math.dist((0, 0, 0), servo.size)))
     assert parse_task(task_to_yaml(task)) == task
 
 
@@ -33,7 +33,7 @@ def test_remote_motors_are_free(given: str) -> None:
     task = parse_task(TEXT + given)
     assert task.hand.drive.motor is None
     assert task.actuator.torque is None
-    assert task.hand.link_length[0] == 2 * task.hand.link_radius
+    assert task.hand.link_length[0] == 3 * task.hand.link_radius
     assert "drive: remote" in task_to_yaml(task)
     assert parse_task(task_to_yaml(task)) == task
 

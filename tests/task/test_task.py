@@ -42,7 +42,8 @@ def test_default_lengths_are_as_documented() -> None:
     assert task.palm.radius == pytest.approx(radius)
     assert task.palm.thickness == pytest.approx(0.2 * radius)
     assert task.hand.link_radius == pytest.approx(0.13 * radius)
-    assert task.hand.link_length == pytest.approx((0.26 * radius, radius + reach))
+    assert task.hand.link_length == pytest.approx((0.39 * radius, radius + reach))
+    assert task.hand.hinge_length == pytest.approx(2.1 * 0.13 * radius)
     assert task.duration == 2
 
 

@@ -1,6 +1,7 @@
 """Distances of bodies against coal's."""
 
 import itertools
+import math
 
 import casadi as ca
 import coal
@@ -9,6 +10,7 @@ import pytest
 
 from casadi_hands.geometry.bodies.capsule import Capsule
 from casadi_hands.geometry.bodies.sphere import Sphere
+from casadi_hands.task.hand import SHORTEST_HINGE
 from casadi_hands.terms import clearance
 
 RADIUS = 0.1
@@ -18,13 +20,11 @@ OTHER = np.array([[-0.7, 0, 0], [-0.9, -0.4, 0.9], [-0.2, -0.8, 1.6]])
 BODIES = Capsule(np.array([-1, 0, 2.2]), np.array([1, 0.2, 2.4]), 0.3), Sphere(np.array([1.2, 1, 1]), 0.25)
 
 
-def fold_apart(points: np.ndarray, joint: int) -> float:
-    """Gap (coal) of two balls of the links' radius on the links at a joint, two radii off it each."""
-    balls = []
-    for end in (points[joint - 1], points[joint + 1]):
-        along = (end - points[joint]) / np.linalg.norm(end - points[joint])
-        balls += [coal.Sphere(RADIUS), coal.Transform3s(np.eye(3), points[joint] + 2 * RADIUS * along)]
-    return float(coal.distance(*balls, coal.DistanceRequest(), coal.DistanceResult()))
+def fold(points: np.ndarray, joint: int) -> float:
+    """A radius times the cosine of the turn at a joint, by the law of cosines, over that of the sharpest fold."""
+    before, after = (math.dist(points[joint], points[joint + side]) for side in (-1, 1))
+    across = math.dist(points[joint - 1], points[joint + 1])
+    return RADIUS * ((across**2 - before**2 - after**2) / (2 * before * after) + 0.3)
 
 
 def of_one(points: np.ndarray) -> np.ndarray:
@@ -74,7 +74,7 @@ def test_links_of_two_fingers_and_of_one() -> None:
         coal_distance(*JOINTS[i : i + 2], *OTHER[j : j + 2], RADIUS, RADIUS) for i in range(3) for j in range(2)
     ]
     np.testing.assert_allclose(found, expected, atol=5e-4)
-    folds = [fold_apart(JOINTS, 1), fold_apart(JOINTS, 2)]
+    folds = [fold(JOINTS, 1), fold(JOINTS, 2)]
     np.testing.assert_allclose(
         of_one(JOINTS), [coal_distance(*JOINTS[:2], *JOINTS[2:], RADIUS, RADIUS), *folds], atol=5e-4
     )
@@ -82,15 +82,19 @@ def test_links_of_two_fingers_and_of_one() -> None:
     assert of_one(JOINTS[:2]).size == 0
 
 
-@pytest.mark.parametrize("degrees", [0, 30, 90, 119, 121, 150, 180])
-def test_neighbours_are_apart_up_to_120_degrees_whatever_their_lengths(degrees: float) -> None:
-    # Two radii off the joint, balls of a radius just touch where the links make an equilateral triangle with it.
+@pytest.mark.parametrize("degrees", [0, 30, 90, 107.4, 107.5, 108, 150, 180])
+@pytest.mark.parametrize("length", [0.3, 0.8])
+def test_neighbours_that_fold_no_sharper_than_allowed_are_clear_of_each_other(degrees: float, length: float) -> None:
     angle = np.radians(degrees)
-    for length in (0.15, 0.8):
-        points = np.array([[0, 0, 0], [0, 0, 0.5], [0, length * np.sin(angle), 0.5 + length * np.cos(angle)]])
-        (found,) = of_one(points)
-        assert found == pytest.approx(4 * RADIUS * np.cos(angle / 2) - 2 * RADIUS, abs=5e-4)
-        assert (found > 0) == (degrees < 120)
+    along = np.array([0, np.sin(angle), np.cos(angle)])
+    points = np.array([[0, 0, 0], [0, 0, 0.5], [0, 0, 0.5] + length * along])
+    (found,) = of_one(points)
+    assert found == pytest.approx(RADIUS * (np.cos(angle) + 0.3), abs=5e-4)
+    # Bodies as they are built: each begins the shortest hinge off its joint.
+    hinge = SHORTEST_HINGE * RADIUS
+    apart = coal_distance([0, 0, hinge], points[1], points[1] + hinge * along, points[2], RADIUS, RADIUS)
+    assert (apart > 0) == (degrees < 107.7)
+    assert (found > 0) == (degrees < 107.45)
 
 
 def test_links_and_palm_are_seen_beside_above_and_below_its_rim() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from casadi_hands.verify.figures.clearance import body_pairs, joint_figures, penetration_figure
+from casadi_hands.verify.figures.clearance import body_pairs, joint_figure, penetration_figure, speed_figure
 from casadi_hands.verify.figures.dynamics import shoot
 from casadi_hands.verify.reading.folder import Folder, read_folder
 from casadi_hands.verify.trajectory import build_trajectory
@@ -79,7 +79,8 @@ def test_joint_beyond_its_limit_and_its_speed(tmp_path: Path) -> None:
     angles[:, 1] = 2.8 * np.sin(np.pi * TIME / 2)
     text = SPHERE + "actuator: {torque: 1, speed: 8}\n"
     folder = _read(tmp_path, text=text, joint_angles=angles)
-    beyond, speed = joint_figures(folder, build_trajectory(folder, shoot(folder)))
+    path = build_trajectory(folder, shoot(folder))
+    beyond, speed = joint_figure(folder, path), speed_figure(folder, path)
     assert beyond.value == pytest.approx(np.rad2deg(2.8) - 150.0, abs=1e-6)
     assert "finger1_joint0 of finger 'right'" in beyond.text
     assert beyond.by_interval is not None
