@@ -112,6 +112,22 @@ def _disc_inertia(mass: float, radius: float, thickness: float) -> np.ndarray:
     return np.diag([across, across, mass * radius**2 / 2])
 
 
+def _palm_inertial(hand: Hand) -> tuple[float, np.ndarray, np.ndarray]:
+    """Mass, centre of mass and inertia about it: a disc, and a ball where a hinged finger stands."""
+    mass = hand.density * np.pi * hand.palm_radius**2 * hand.palm_thickness
+    disc = _disc_inertia(mass, hand.palm_radius, hand.palm_thickness)
+    parts = [(mass, np.array([0.0, 0.0, -hand.palm_thickness / 2]), disc)]
+    for finger in hand.fingers:
+        if finger.links[0].hinge:
+            radius = finger.links[0].radius
+            ball = hand.density * 4 / 3 * np.pi * radius**3
+            parts.append((ball, np.array(finger.base), 2 / 5 * ball * radius**2 * np.eye(3)))
+    total = sum(part[0] for part in parts)
+    center = np.sum([part[0] * part[1] for part in parts], axis=0) / total
+    inertia = np.sum([own - m * _skew(at - center) @ _skew(at - center) for m, at, own in parts], axis=0)
+    return float(total), center, inertia
+
+
 def _capsule_inertia(mass: float, radius: float, length: float) -> np.ndarray:
     """A cylinder and a ball cut in two, by the parallel axes' theorem, applied to half a ball twice."""
     rod = mass * length / (length + 4 / 3 * radius)
@@ -126,19 +142,22 @@ def hand_urdf(hand: Hand) -> str:
     """Write the hand as the format says."""
     robot = ElementTree.Element("robot", name="hand")
     palm = _element(robot, "link", name="palm")
-    mass = hand.density * np.pi * hand.palm_radius**2 * hand.palm_thickness
     middle, size = [0.0, 0.0, -hand.palm_thickness / 2], {"radius": hand.palm_radius, "length": hand.palm_thickness}
-    _inertial(palm, mass, middle, _disc_inertia(mass, hand.palm_radius, hand.palm_thickness))
+    _inertial(palm, *_palm_inertial(hand))
     for role in ("visual", "collision"):
         _shape(palm, role, "cylinder", middle, [0.0, 0.0, 0.0], **size)
+    for finger in hand.fingers:
+        if finger.links[0].hinge:
+            _capsule(palm, finger.base, finger.base, finger.links[0].radius)
     for i, finger in enumerate(hand.fingers):
         parent, origin = "palm", np.asarray(finger.base)
         for j, segment in enumerate(finger.links):
             name = f"finger{i}_link{j}"
             link = _element(robot, "link", name=name)
-            mass = hand.density * np.pi * segment.radius**2 * (segment.length + 4 / 3 * segment.radius)
-            _inertial(link, mass, [0, 0, segment.length / 2], _capsule_inertia(mass, segment.radius, segment.length))
-            _capsule(link, [0, 0, 0], [0, 0, segment.length], segment.radius)
+            long, start = segment.length - segment.hinge, [0, 0, segment.hinge]
+            mass = hand.density * np.pi * segment.radius**2 * (long + 4 / 3 * segment.radius)
+            _inertial(link, mass, [0, 0, segment.hinge + long / 2], _capsule_inertia(mass, segment.radius, long))
+            _capsule(link, start, [0, 0, segment.length], segment.radius)
             joint = _element(robot, "joint", name=f"finger{i}_joint{j}", type="revolute")
             _element(joint, "parent", link=parent)
             _element(joint, "child", link=name)
@@ -167,7 +186,10 @@ def result(task: Task, hand: Hand, samples: int) -> dict[str, Any]:
         {
             "name": f.name,
             "base": f.base,
-            "links": [{"length": s.length, "radius": s.radius, "axis": s.axis, "bend": s.bend} for s in f.links],
+            "links": [
+                {"length": s.length, "radius": s.radius, "axis": s.axis, "bend": s.bend, "hinge": s.hinge}
+                for s in f.links
+            ],
         }
         for f in hand.fingers
     ]
@@ -246,14 +268,21 @@ motion:
 {goals}
 fingers: {{one: {{touches: {0}}}, two: {{touches: {1}}}, three: {{touches: {2}}}}}
 friction: 0.9
-hand: {{joint_limits: [-150, 150], link_radius: 0.006}}
+hand: {{joint_limits: [-150, 150], link_radius: 0.006, hinge_length: {hinge}}}
 actuator: {{torque: 0.5, speed: 5}}
 limits: {{unsupplied_force: 10}}
 {fingertip}
 """
 
 
-def carried(directory: Path, more: str = "", shape: str = "capsule", hard: bool = False, bent: bool = False) -> Scene:
+def carried(
+    directory: Path,
+    more: str = "",
+    shape: str = "capsule",
+    hard: bool = False,
+    bent: bool = False,
+    hinge: float = 0.0,
+) -> Scene:
     """Three fingers of two joints, held stiff, and an object between them; the palm carries all along a free curve.
 
     Forces and torsional moments are chosen first and SciPy integrates the object under them; the palm then follows it
@@ -266,16 +295,18 @@ def carried(directory: Path, more: str = "", shape: str = "capsule", hard: bool 
         shape: of the object, ``capsule`` or ``cylinder``; contacts are on the side that both have.
         hard: whether fingertips are points, without moments.
         bent: whether links are bent at zero angle; they stand where straight ones do.
+        hinge: from a joint to where its link's body begins, m; 0 where neighbours share a ball.
     """
     fingertip = "fingertip: {torsion: 0}" if hard else ""
     time, ends = np.linspace(0.0, 2.0, 21), [[0, 0, 0.28]] * 2
     places = [c.tolist() for c in CONTACTS]
     goals = _goals([0, 2], ends, [[1, 0, 0, 0]] * 2)
-    task = read_task(directory, _TASK.format(*places, shape=shape, goals=goals, fingertip=fingertip))
+    given = {"shape": shape, "fingertip": fingertip, "hinge": hinge}
+    task = read_task(directory, _TASK.format(*places, goals=goals, **given))
     moments = np.zeros((len(time), 3, 3)) if hard else _moments(time)
     forces, position, quaternion = _carrying(task, moments)
     goals = _goals([0, 1, 2], position[[0, 10, 20]], quaternion[[0, 10, 20]])
-    task = read_task(directory, _TASK.format(*places, shape=shape, goals=goals, fingertip=fingertip) + more)
+    task = read_task(directory, _TASK.format(*places, goals=goals, **given) + more)
     hand, angles, points = _grasp(task, BENDS if bent else ((0.0, 0.0),) * 2)
     turn = Rotation.from_quat(quaternion, scalar_first=True)
     base = Rotation.from_matrix(task.palm.rotation)
@@ -471,6 +502,7 @@ def _grasp(task: Task, bends: tuple[tuple[float, float], ...]) -> tuple[Hand, np
         axis, turn, links = np.cross([0, 0, 1], radial), Rotation.identity(), []
         for length, way, bend in zip(lengths, (outer, inner), bends, strict=True):
             link, angle = _pointing(float(length), turn.apply(way, inverse=True), axis, np.deg2rad(bend))
+            link = replace(link, hinge=float(task.hand.hinge_length))
             turn *= Rotation.from_rotvec([*link.bend, 0.0]) * Rotation.from_rotvec(angle * np.array(link.axis))
             links.append(link)
             angles.append(angle)
@@ -540,7 +572,7 @@ palm: {radius: 0.05, position: [0, 0, -0.5], facing: [0, 0, 1]}
 motion: [{at: 0, position: [0, 0, 0]}, {at: 1, position: [0, 0, 0]}]
 fingers: {left: {touches: [-0.03, 0, 0]}, right: {touches: [0.03, 0, 0]}}
 friction: 0.5
-hand: {joint_limits: [-150, 150], link_radius: 0.006}
+hand: {joint_limits: [-150, 150], link_radius: 0.006, hinge_length: 0}
 """
 """A ball of 3 cm that stands half a metre over an upright palm, for scenes where the hand matters little."""
 
