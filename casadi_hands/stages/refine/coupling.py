@@ -66,8 +66,8 @@ def pressing(joints: int, kind: type[Body], soft: bool, motors: int) -> Kernel:
     torque = ca.mtimes(here.jacobian.T, ca.mtimes(touch.rotation, force))
     if soft:
         moment = kernel.parameter("torsion_radius") * kernel.variable("torsion", 1) * touch.normal
-        turns = ca.horzcat(SX.eye(3), here.rotations)
-        axes = [ca.mtimes(turns[:, 3 * j : 3 * j + 3], symbols.axes[:, j]) for j in range(joints)]
+        # A joint's own turn leaves its axis where it is.
+        axes = [ca.mtimes(here.rotations[:, 3 * j : 3 * j + 3], symbols.axes[:, j]) for j in range(joints)]
         torque += ca.mtimes(ca.horzcat(*axes).T, ca.mtimes(touch.rotation, moment))
     kernel.constrain(limits.ON_LINES, angles + torque / stiffness - _lines(kernel, joints, motors))
     return kernel
