@@ -206,7 +206,10 @@ HIDDEN: Cases = {
         r"finger 'one' \(link 1\): hand\.urdf has more than the one capsule",
     ),
     "an element nobody knows": (added(HAND, ".", "<gazebo reference='palm'/>"), r"<gazebo> in <robot"),
-    "a joint that mimics": (added(HAND, JOINT, "<mimic joint='finger0_joint0'/>"), r"<mimic> in <joint"),
+    "a joint that mimics": (
+        added(HAND, JOINT, "<mimic joint='finger0_joint0'/>"),
+        r"it mimics finger0_joint0; by its motors",
+    ),
     "a motor of no joint": (
         added(HAND, ".", "<transmission name='t'><joint name='finger9_joint0'/></transmission>"),
         r"turns joint 'finger9_joint0', which there is not",

@@ -82,6 +82,8 @@ def read_robot(path: Path) -> Robot:
             name = name_of(path, element, joints)
             joints[name] = _read_joint(path, name, element)
             strange += strangers(element, "parent child origin axis limit mimic", "name type")
+            for mimic in element.findall("mimic"):
+                strange += strangers(mimic, "", "joint multiplier offset")
         elif element.tag == "mujoco":
             strange += _compiler(element)
         elif element.tag == "transmission":
