@@ -120,6 +120,15 @@ IN_THE_SCENE: Cases = {
     "a motor less": (removed(SCENE, ".//position[@joint='finger2_joint1']"), r"its actuators turn"),
     "a motor on the object": (added(SCENE, "actuator", "<motor joint='object'/>"), r"<motor> in <actuator>"),
     "a tendon": (added(SCENE, ".", "<tendon/>"), r"<tendon> in <mujoco"),
+    "a spring beside the motor": (
+        added(
+            SCENE,
+            ".",
+            "<tendon><fixed name='s' springlength='0' stiffness='1'><joint joint='finger0_joint0' coef='1'/></fixed>"
+            "</tendon>",
+        ),
+        r"it has springs, though every joint has a motor of its own",
+    ),
     "an included file": (added(SCENE, "worldbody", "<include file='x.xml'/>"), r"<include> in <worldbody>"),
     "a default of no collisions": (attribute(SCENE, "default/geom", "conaffinity", "0"), r"no attribute conaffinity"),
     "a keyframe's pose": (

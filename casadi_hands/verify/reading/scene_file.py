@@ -162,6 +162,8 @@ def read_scene(path: Path) -> Scene:
             scene.strange.extend(strangers(element, tags, attributes))
             for child in element:
                 _read_entry(path, scene, child)
+    if section["tendon"] is not None and not scene.springs:
+        scene.strange.append("<tendon> in <mujoco> holds no spring")
     _read_body(path, scene, world, "world")
     return scene
 
