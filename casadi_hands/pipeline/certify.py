@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 LONG_DROPS = 0.5  # share of the replays: where more drop the object, all hands of a structure are tried
 OUT_OF_REACH = 0.3  # lengths that a finger misses its contact by: nothing is left to refine
 SURELY = np.pi / 2  # that an object may turn so that contacts can surely go with it
+MOBILE = 3  # ways to go of object and joints together, with which it depends on the hand whether contacts must slip
 HANDS_REFINED = 2  # hands of one structure that are tried, and more only where nothing else is left to try
 
 
@@ -76,7 +77,7 @@ class Certifier:
                 if judged.drops is not None:
                     fewest = min(fewest, judged.drops / judged.replays[0]["of"])
                 failing |= failing_fingers(self.model, refined)
-                if refined.barely_rolls:
+                if refined.barely_rolls and _mobility(candidate.joints) < MOBILE:
                     break  # a structure that must slip will do so in any of its hands
             least = self._more_joints(found, failing)
             if least is None:
@@ -105,6 +106,11 @@ class Certifier:
             return None
         fewest = min(joints[c] for c in chosen)
         return {c: n + (c in chosen and n == fewest) for c, n in joints.items()}
+
+
+def _mobility(joints: tuple[int, ...]) -> int:
+    """How many ways object and joints can go at once while all fingers roll (Grübler)."""
+    return 6 + sum(n - 3 for n in joints)
 
 
 def refinable(record: Record, model: Model, floating: Floating) -> tuple[Model, Floating, float]:

@@ -137,6 +137,10 @@ def test_a_structure_that_must_slip_is_tried_once(monkeypatch: pytest.MonkeyPatc
     loop = Loop(monkeypatch, [(1, (0,), True), (0, (), False)], max_joints=3)
     assert loop.run(found((1, 1), (1, 1))).status == "certified"
     assert loop.least == [{0: 2, 1: 1}]
+    # Where joints could follow, another hand of the same structure may.
+    loop = Loop(monkeypatch, [(1, (0,), True), (0, (), False)], max_joints=3)
+    assert loop.run(found((2, 2), (2, 2))).status == "certified"
+    assert loop.tried == [(2, 2), (2, 2)]
 
 
 def test_a_hand_far_from_its_contacts_is_not_refined(monkeypatch: pytest.MonkeyPatch) -> None:
