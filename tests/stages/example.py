@@ -224,12 +224,12 @@ def segments_apart(a: Array, b: Array, c: Array, d: Array) -> float:
 
 
 def folds_apart(chain: Sequence[tuple[Array, Array]], radius: float) -> list[float]:
-    """Gaps of balls of a radius on neighbouring links' axes, two radii off the joint between them."""
-    gaps = []
+    """How far neighbouring links are from the sharpest fold, of cosine -0.3, times a radius; law of cosines."""
+    folds = []
     for (start, joint), (_, end) in itertools.pairwise(chain):
-        balls = [joint + 2 * radius * (p - joint) / np.linalg.norm(p - joint) for p in (start, end)]
-        gaps.append(float(np.linalg.norm(balls[0] - balls[1])) - 2 * radius)
-    return gaps
+        before, after, across = (float(np.linalg.norm(a - b)) for a, b in ((joint, start), (end, joint), (end, start)))
+        folds.append(radius * ((across**2 - before**2 - after**2) / (2 * before * after) + 0.3))
+    return folds
 
 
 def palm_apart(point: Array, radius: float) -> float:

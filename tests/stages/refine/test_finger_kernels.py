@@ -37,7 +37,7 @@ Block = tuple[dict[str, object], dict[str, object]]
 class Contact:
     """A contact of a random finger and a random capsule, off both surfaces; its force leans out of the cone or not."""
 
-    friction, radius = 0.6, 0.2
+    friction, radius, hinge = 0.6, 0.2, 0.4
 
     def __init__(self, joints: int, seed: int) -> None:
         rng = np.random.default_rng((joints, seed))
@@ -53,7 +53,7 @@ class Contact:
     @property
     def scene(self) -> dict[str, object]:
         parameters = {"frames": frames(self.finger), **self.place.parameters}
-        return {**parameters, "body": self.capsule, "radius": self.radius}
+        return {**parameters, "body": self.capsule, "radius": self.radius, "hinge": self.hinge}
 
     @property
     def contact(self) -> Block:
@@ -91,7 +91,7 @@ def test_a_contact_s_numbers_are_those_of_numpy_and_pinocchio(joints: int, seed:
     on_link = link.T @ (place.in_palm(case.point) - chain[-2])
     # Kinks of capsules are rounded by a thousandth of their length.
     np.testing.assert_allclose(found["on_object"], case.off_object, atol=1e-5)
-    axis = np.array([0, 0, 0, 0, 0, finger.lengths[-1], case.radius])
+    axis = np.array([0, 0, case.hinge, 0, 0, finger.lengths[-1], case.radius])
     from_link = place.turn.inv().apply(place.palm.apply(link @ (on_link - nearest_on_axis(on_link, axis))))
     np.testing.assert_allclose(found["on_link"], from_link + case.radius * normal, atol=5e-3)
     pressing = -force @ normal
@@ -119,6 +119,22 @@ def test_a_contact_s_numbers_are_those_of_numpy_and_pinocchio(joints: int, seed:
         found["stay_point"], case.tie**2 * ((case.point - case.wanted_point) ** 2).sum(), rtol=1e-12
     )
     np.testing.assert_allclose(found["stay_force"], ((force - case.wanted_force) ** 2).sum(), rtol=1e-12)
+
+
+@pytest.mark.parametrize("joints", [1, 2, 3])
+def test_a_link_ends_in_a_cap_about_its_hinge(joints: int) -> None:
+    # Where a capsule from the joint on would still be, a hinged link is as far off as its cap is.
+    case = Contact(joints, 8)
+    chain, link = PinFinger(case.finger, case.radius).chain(case.finger.angles[0])
+    for below in (0.0, 0.1, 0.4):
+        touched = chain[-2] + link @ [case.radius, 0, case.hinge - below]
+        case.place.position = case.place.palm.apply(touched) + case.place.palm_position
+        case.place.position -= case.place.turn.apply(case.point)
+        found = numbers(finger_kernels.contact(joints, Capsule, limited=True), *case.contact)
+        normal = surface(case.point, case.capsule)[1]
+        in_object = case.place.turn.inv() * case.place.palm
+        from_axis = in_object.apply(link @ [case.radius, 0, -below])
+        np.testing.assert_allclose(found["on_link"], from_axis + case.radius * normal, atol=5e-3)
 
 
 @pytest.mark.parametrize(("share", "outside"), [(0.5, 1), (0.5, -1), (1.0, 1), (1.0, -1)])
@@ -201,7 +217,7 @@ def rolling_block(before: Knot, after: Knot) -> Block:
         point = turn.inv().apply(contact - position)
         knots |= {f"pose{i}": np.r_[position, turn.as_rotvec()], f"point{i}": point, f"angles{i}": angle}
         scenes |= {f"reference{i}": STILL, f"palm_position{i}": np.zeros(3), f"palm_quaternion{i}": STILL}
-        scenes |= {f"body{i}": [0, 0, 0, BALL], f"radius{i}": TIP}
+        scenes |= {f"body{i}": [0, 0, 0, BALL], f"radius{i}": TIP, f"hinge{i}": 0.1}
     across = np.cross(before[2] - before[0], [0, 1, 0])
     helper = before[1].inv().apply(across)
     parameters = {"frames": frames(UPRIGHT), **scenes, "helper": helper, "step": STEP}

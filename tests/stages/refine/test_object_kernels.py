@@ -270,6 +270,7 @@ def test_a_ground_contact_s_numbers_are_those_of_scipy_s_rotations(seed: int) ->
     np.testing.assert_allclose(found["cone"], (MU * exerted[2]) ** 2 - exerted[0] ** 2 - exerted[1] ** 2, atol=1e-12)
     np.testing.assert_allclose(found["stay_point"], ((point - wanted_point) ** 2).sum(), rtol=1e-12)
     np.testing.assert_allclose(found["stay_force"], ((force - wanted_force) ** 2).sum(), rtol=1e-12)
+    np.testing.assert_allclose(found["ground_load"], exerted[2] ** 2, rtol=1e-12)
     second = numbers(
         body.disturbed_ground(), {"pose": place.pose, "force": force}, {"reference": reference, "friction": MU}
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -104,7 +105,7 @@ class Witness(ObjectWitness):
     def touch(self, total: dict[str, float], c: int) -> None:
         seed, finger, h = self.fingers[c], self.pins[c], self.schedule.step
         now, before = self.angles_at(c, 0), self.angles_at(c, -1)
-        tip = np.array([0, 0, 0, 0, 0, seed.lengths[-1], self.model.link_radius])
+        tip = np.array([0, 0, self.model.hinge, 0, 0, seed.lengths[-1], self.model.link_radius])
         for s in range(len(self.schedule.samples)):
             point, active, force = self.points[1][s, c], self.invariant[s, c], self.forces[""][s, c]
             size, touched = np.linalg.norm(force), self.in_palm(s, point)
@@ -163,7 +164,8 @@ class Case:
     """The task with everything, three fingers of one, two and three joints; the palm given or free to move."""
 
     def __init__(self, palm_moves: bool) -> None:
-        self.task, self.model = everything()
+        self.task, model = everything()
+        self.model = replace(model, hinge=2.1 * model.link_radius)
         self.stage = WholeHandStage(self.model, CONTACTS, JOINTS, palm_moves)
         self.fingers = tuple(made_up_finger(self.model, n, 1, *at) for n, *at in zip(JOINTS, SEEDS, BENDS, strict=True))
         self.fingers[1].bends[1] = FOLDED
@@ -201,7 +203,8 @@ def test_term_is_its_equation(term: str, case: Case) -> None:
     share = 3 if term == "task" else len(case.model.schedule.keyframes)
     expected = case.weights[WEIGHT_OF.get(name, name)] / share * case.expected[term]
     assert expected > 1e-6
-    assert case.evaluate(case.weights)[term] == pytest.approx(expected, rel=1e-3)
+    # Folds are a small part of the overlaps.
+    assert case.evaluate(case.weights)[term] == pytest.approx(expected, rel=1e-5 if term == "collision" else 1e-3)
 
 
 def test_a_moving_palm_costs_its_acceleration_and_its_distance_from_what_was_given(case: Case) -> None:
