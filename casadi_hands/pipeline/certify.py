@@ -23,7 +23,6 @@ from casadi_hands.stages.refine.result import Refined
 from casadi_hands.stages.synthesis.algorithm import Candidate, Found, Search
 
 Array = NDArray[np.float64]
-LONG_DROPS = 0.5  # share of the replays: where more drop the object, all hands of a structure are tried
 OUT_OF_REACH = 0.3  # lengths that a finger misses its contact by: nothing is left to refine
 SURELY = np.pi / 2  # that an object may turn so that contacts can surely go with it
 MOBILE = 3  # ways to go of object and joints together, with which it depends on the hand whether contacts must slip
@@ -52,8 +51,7 @@ class Certifier:
         """Refine the best hand, the next best, then hands with one more joint where those failed.
 
         A hand whose files or replays don't hold makes way for the next best of its structure. All of them are tried
-        only where no finger may have another joint, and hands whose files hold drop the object more often than not. The
-        record's best design, which may be one from before, is returned.
+        only where no finger may have another joint. The record's best design, maybe one from before, is returned.
 
         Args:
             found: by the search.
@@ -64,18 +62,15 @@ class Certifier:
             return self.record.update_best(self.record.held_to_bounds(self.judge.judge(self.record.design, short)))
         while True:
             failing: set[str] = set()
-            fewest = np.inf  # share of replays that drop the object, of a hand whose files hold
             for k, candidate in enumerate(found.candidates):
                 may_grow = self._more_joints(found, failing) is not None
-                if k >= HANDS_REFINED and (fewest <= LONG_DROPS or may_grow):
+                if k >= HANDS_REFINED and may_grow:
                     break
                 judged, refined = self._certify(candidate, short)
                 best = self.record.update_best(judged)
                 if judged.status == "certified":
                     return best
                 self.record.log("refine", f"not certified: {judged.reason}")
-                if judged.drops is not None:
-                    fewest = min(fewest, judged.drops / judged.replays[0]["of"])
                 failing |= failing_fingers(self.model, refined)
                 if refined.barely_rolls and _mobility(candidate.joints) < MOBILE:
                     break  # a structure that must slip will do so in any of its hands

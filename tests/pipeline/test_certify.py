@@ -90,9 +90,8 @@ def test_the_first_certified_hand_is_returned(monkeypatch: pytest.MonkeyPatch) -
 def test_a_certified_hand_that_drops_the_object_makes_way_for_one_that_drops_it_less(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    cases = (([12, 0], 2, 2), ([12, 5], 2, 2), ([5, 12], 1, 2), ([2, 0], 2, 2), ([1, 0], 1, 1))
-    # Those that drop it more often than not make way for all the others.
-    for dropped, best, tried in (*cases, ([12, 7, 3], 3, 3), ([12, 7, 8], 2, 3), ([8, 6, 0], 2, 2)):
+    cases = (([12, 0], 2, 2), ([12, 5, 6], 2, 3), ([5, 12, 13], 1, 3), ([2, 0], 2, 2), ([1, 0], 1, 1))
+    for dropped, best, tried in (*cases, ([12, 7, 3], 3, 3), ([12, 7, 8], 2, 3), ([8, 6, 0], 3, 3)):
         loop = Loop(monkeypatch, 3 * [(0, (), False)], max_joints=1)
         loop.dropped = dropped
         assert loop.run(found((1, 1), (1, 1), (1, 1))).reason == f"attempt {best}"
