@@ -92,11 +92,11 @@ class Certifier:
         return refinable(self.record, self.model, self.floating)
 
     def _more_joints(self, found: Found, failing: set[str]) -> dict[int, int] | None:
-        """Joints of each finger for the next round; None when no failing finger may have more."""
+        """Joints of each finger for the next round, more for those that fail if they may, else for any; or None."""
         best = found.candidates[0]
         joints = dict(zip(best.hand.contacts, best.joints, strict=True))
-        chosen = [c for c in joints if self.model.contact_names[c] in failing] or list(joints)
-        chosen = [c for c in chosen if joints[c] < self.search.max_joints]
+        chosen = [c for c in joints if joints[c] < self.search.max_joints]
+        chosen = [c for c in chosen if self.model.contact_names[c] in failing] or chosen
         if not chosen:
             return None
         fewest = min(joints[c] for c in chosen)

@@ -106,24 +106,24 @@ def test_where_hands_drop_the_object_fingers_get_another_joint(monkeypatch: pyte
     assert loop.tried == [(1, 1), (1, 1), (2, 2)]
 
 
-def test_the_finger_that_failed_gets_a_joint_until_none_may(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_finger_that_failed_gets_a_joint_then_the_others_until_none_may(monkeypatch: pytest.MonkeyPatch) -> None:
     verdicts = [(3, (1,), False), (4, (1,), False), (1, (1,), False)]
-    loop = Loop(monkeypatch, [*verdicts, (2, (1,), False)], max_joints=3)
+    loop = Loop(monkeypatch, [*verdicts, *3 * [(2, (1,), False)]], max_joints=3)
     design = loop.run(found((1, 1), (1, 1)))
-    assert loop.tried == [(1, 1), (1, 1), (1, 2), (1, 3)]
-    assert loop.least == [{0: 1, 1: 2}, {0: 1, 1: 3}]
-    # The third attempt missed fewest limits; a fourth was made after it, and its run and time are the design's too.
+    assert loop.tried == [(1, 1), (1, 1), (1, 2), (1, 3), (2, 3), (3, 3)]
+    assert loop.least == [{0: 1, 1: 2}, {0: 1, 1: 3}, {0: 2, 1: 3}, {0: 3, 1: 3}]
+    # The third attempt missed fewest limits; others were made after it, and their runs and time are the design's too.
     assert design.reason == "attempt 3"
-    assert [run["what"] for run in loop.record.complete(design).stages] == [1, 2, 3, 4]
+    assert [run["what"] for run in loop.record.complete(design).stages] == [1, 2, 3, 4, 5, 6]
 
 
 def test_all_hands_are_tried_where_no_finger_may_have_another_joint(monkeypatch: pytest.MonkeyPatch) -> None:
     verdicts = 3 * [(1, (1,), False)]
     loop = Loop(monkeypatch, [*verdicts, (0, (), False)], max_joints=1)
     assert loop.run(found((1, 1), (1, 1), (1, 1), (1, 1))).status == "certified"
-    loop = Loop(monkeypatch, verdicts, max_joints=2)
+    loop = Loop(monkeypatch, [*verdicts, (1, (1,), False)], max_joints=2)
     loop.run(found((1, 1), (1, 1), (1, 1), (1, 1)))
-    assert loop.tried == [(1, 1), (1, 1), (1, 2)]
+    assert loop.tried == [(1, 1), (1, 1), (1, 2), (2, 2)]
 
 
 def test_where_no_finger_is_to_blame_those_with_fewest_joints_get_one(monkeypatch: pytest.MonkeyPatch) -> None:
