@@ -135,7 +135,13 @@ def test_the_record_says_what_the_format_says(saved):
     assert result["hand"]["palm"] == {"radius": 0.06, "thickness": 0.012}
     index = result["hand"]["fingers"][1]
     assert (index["name"], index["base"]) == ("index", [0.02, 0.045, 1.05 * 0.008])
-    assert index["links"][1] == {"length": 0.08, "radius": 0.008, "axis": [1, 0, 0], "bend": [0, 0]}
+    assert index["links"][1] == {
+        "length": 0.08,
+        "radius": 0.008,
+        "axis": [1, 0, 0],
+        "bend": [0, 0],
+        "hinge": 0,
+    }
     assert {"casadi-hands", "casadi", "pin", "numpy"} <= set(result["versions"])
     assert result["certificate"]["slip"]["holds"] is False
     assert result["costs"]["whole_hand"]["torque"] == {"weight": 0.05, "value": 1.25}

@@ -44,7 +44,7 @@ def test_a_hand_and_its_motion_are_audited_once(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(judge, "audit_files", lambda folder: audits.append(folder) or verdict)
     judges, design = Judge(*still(0.5)), upright(0.0)[1]
     judged = judges.judge(design, ())
-    assert judges.audited(judged) is verdict
+    assert judges.audited(judged) == verdict
     assert len(audits) == 1
     judges.audited(upright(0.0)[1])
     assert len(audits) == 2

@@ -462,6 +462,28 @@ SPOILT = {
         "hand: {link_length: [0.1, 0.02]}\nname:",
         "1: hand.link_length: given [0.1, 0.02]; allowed: [min, max] with 0 < min <= max",
     ),
+    "hinge too short for its links": (
+        "name:",
+        "hand: {link_radius: 0.01, hinge_length: 0.02}\nname:",
+        "1: hand.hinge_length: given 0.02; allowed: 0, or at least 2.1 × link_radius (0.021) and less than the "
+        "shortest link (0.03)",
+    ),
+    "hinge as long as the shortest link": (
+        "name:",
+        "hand: {link_radius: 0.01, link_length: [0.04, 0.1], hinge_length: 0.04}\nname:",
+        "1: hand.hinge_length: given 0.04; allowed: 0, or at least 2.1 × link_radius (0.021) and less than the "
+        "shortest link (0.04)",
+    ),
+    "hinge of less than nothing": (
+        "name:",
+        "hand: {hinge_length: -0.01}\nname:",
+        "1: hand.hinge_length: given -0.01; allowed: a number of at least 0",
+    ),
+    "hinge of words": (
+        "name:",
+        "hand: {hinge_length: some}\nname:",
+        "1: hand.hinge_length: given 'some'; allowed: a number (without quotes or unit; lengths in m, ...",
+    ),
     "joint limits reversed": (
         "name:",
         "hand: {joint_limits: [90, -90]}\nname:",

@@ -20,9 +20,9 @@ gravity: [0, 0, {g}]
 """
 
 
-def capsule(scale: float = 1.0) -> Task:
+def capsule(scale: float = 1.0, more: str = "") -> Task:
     lengths = {"low": -0.04, "high": 0.04, "r2": 0.02, "h": 0.3, "near": 0.1, "far": 0.15, "g": -9.81}
-    return parse_task(CAPSULE.format(mass=0.1, **{name: scale * value for name, value in lengths.items()}))
+    return parse_task(CAPSULE.format(mass=0.1, **{name: scale * value for name, value in lengths.items()}) + more)
 
 
 def test_default_lengths_scale_with_the_file() -> None:
@@ -45,6 +45,24 @@ def test_default_lengths_are_as_documented() -> None:
     assert task.hand.link_length == pytest.approx((0.39 * radius, radius + reach))
     assert task.hand.hinge_length == pytest.approx(2.1 * 0.13 * radius)
     assert task.duration == 2
+
+
+@pytest.mark.parametrize(
+    ("given", "hinge"),
+    [
+        ("link_radius: 0.01", 0.021),
+        ("link_radius: 0.01, link_length: [0.03, 0.1]", 0.021),
+        ("link_radius: 0.01, link_length: [0.0211, 0.1]", 0.021),
+        ("link_radius: 0.01, link_length: [0.021, 0.1]", 0.0),
+        ("link_radius: 0.01, link_length: [0.012, 0.1]", 0.0),
+        ("link_radius: 0.01, link_length: [0.03, 0.1], hinge_length: 0.029", 0.029),
+        ("link_radius: 0.01, link_length: [0.03, 0.1], hinge_length: 0", 0.0),
+    ],
+)
+def test_hinges_have_room_where_the_shortest_link_does(given: str, hinge: float) -> None:
+    task = capsule(more=f"hand: {{{given}}}\n")
+    assert task.hand.hinge_length == pytest.approx(hinge, rel=1e-12)
+    assert parse_task(task_to_yaml(task)) == task
 
 
 def test_force_unit_with_gravity_off() -> None:
