@@ -69,7 +69,7 @@ def test_links_have_the_mass_of_a_capsule_from_their_hinge_on() -> None:
     for i, (near, far) in enumerate(LENGTHS):
         for j, length in enumerate((near, far)):
             ball = trimesh.creation.icosphere(subdivisions=4, radius=RADIUS).vertices
-            ends = np.vstack([ball + [0, 0, z] for z in (HINGE, length)])
+            ends = np.vstack([np.add(ball, [0, 0, z]) for z in (HINGE, length)])
             check(found[f"finger{i}_link{j}"], solid(trimesh.convex.convex_hull(ends)))
 
 
@@ -156,7 +156,7 @@ def open_scene(built: Hand) -> str:
     """The scene without what keeps neighbours from colliding, and told to look at parents and children."""
     motion = example_motion()
     row = np.zeros((len(motion.time), built.degrees_of_freedom))
-    motion = replace(motion, joint_angles=row, object_position=motion.object_position + [5.0, 0, 0])
+    motion = replace(motion, joint_angles=row, object_position=np.add(motion.object_position, [5.0, 0, 0]))
     root = ElementTree.fromstring(scene_mjcf(example_task(), built, motion))
     excluded = root.findall("contact/exclude")
     pairs = {frozenset((element.get("body1", ""), element.get("body2", ""))) for element in excluded}
