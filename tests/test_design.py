@@ -6,6 +6,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from casadi_hands.errors import DesignError
 from casadi_hands.export.commands import commanded
@@ -74,10 +75,17 @@ def test_bent_links_come_back_as_they_were_and_straight_ones_of_earlier_folders(
         for finger in design.hand.fingers
     )
     replace(design, hand=replace(design.hand, fingers=fingers)).save(tmp_path)
-    assert Design.load(tmp_path).hand.fingers == fingers
     content = record(tmp_path)
-    for finger, built in zip(content["hand"]["fingers"], fingers, strict=True):
-        assert [tuple(link.pop("bend")) for link in finger["links"]] == [link.bend for link in built.links]
+    for finger, built, read in zip(
+        content["hand"]["fingers"], fingers, Design.load(tmp_path).hand.fingers, strict=True
+    ):
+        for link, made, loaded in zip(finger["links"], built.links, read.links, strict=True):
+            assert replace(loaded, axis=made.axis) == made
+            assert loaded.axis == pytest.approx(made.axis, abs=1e-15)
+            assert tuple(link.pop("bend")) == made.bend
+            # As ever, in the parent's frame.
+            assert link["axis"] == pytest.approx(Rotation.from_rotvec([*made.bend, 0]).apply(made.axis), abs=1e-15)
+            link["axis"] = list(made.axis)
     (tmp_path / "result.json").write_text(json.dumps(content))
     assert Design.load(tmp_path).hand.fingers == design.hand.fingers
 

@@ -11,6 +11,7 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from casadi_hands.errors import DesignError
 from casadi_hands.problem.drive import Drive
@@ -88,10 +89,7 @@ def hand_from_record(record: dict[str, Any]) -> Hand | None:
                 Finger(
                     name=str(finger["name"]),
                     base=_vector(finger["base"]),
-                    links=tuple(
-                        Link(float(link["length"]), float(link["radius"]), _vector(link["axis"]), *_begun(link))
-                        for link in finger["links"]
-                    ),
+                    links=tuple(_link(link) for link in finger["links"]),
                 )
                 for finger in entry["fingers"]
             ),
@@ -130,7 +128,7 @@ def _hand(hand: Hand) -> dict[str, Any]:
                     {
                         "length": link.length,
                         "radius": link.radius,
-                        "axis": link.axis,
+                        "axis": link.turn.apply(link.axis) if any(link.bend) else link.axis,
                         "bend": link.bend,
                         "hinge": link.hinge,
                     }
@@ -174,10 +172,12 @@ def rotation_quaternion(vector: np.ndarray) -> np.ndarray:
     return np.array([np.cos(angle / 2), *(np.sinc(angle / (2 * np.pi)) / 2 * np.asarray(vector))])
 
 
-def _begun(link: Mapping[str, Any]) -> tuple[tuple[float, float], float]:
-    """A link's bend, rad, and hinge, m; earlier folders tell none, and have none."""
+def _link(link: Mapping[str, Any]) -> Link:
+    """A link as recorded, its axis in its parent's frame; earlier folders tell no bend and no hinge, and have none."""
     x, y = (float(value) for value in link.get("bend", (0.0, 0.0)))
-    return (x, y), float(link.get("hinge", 0.0))
+    axis = Rotation.from_rotvec([x, y, 0.0]).inv().apply(_vector(link["axis"])) if x or y else link["axis"]
+    hinge = float(link.get("hinge", 0.0))
+    return Link(float(link["length"]), float(link["radius"]), _vector(axis), (x, y), hinge)
 
 
 def _vector(values: Any) -> tuple[float, float, float]:

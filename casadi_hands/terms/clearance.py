@@ -75,11 +75,15 @@ def links_and_links(ends: list[tuple[SX, SX]], others: list[tuple[SX, SX]], radi
 
 
 def links_of_one(ends: list[tuple[SX, SX]], radius: SX) -> SX:
-    """Distances between links of one finger; of neighbours how far they are from the sharpest fold, times a radius."""
+    """Distances between links of one finger that are not neighbours."""
     pairs = [(ends[i], ends[j]) for i in range(len(ends)) for j in range(i + 2, len(ends))]
+    return ca.vertcat(SX.zeros(0, 1), *[segment_distance(*a, *b) - 2 * radius for a, b in pairs])
+
+
+def unfolded(ends: list[tuple[SX, SX]], radius: SX) -> SX:
+    """How far neighbours (L - 1,) are from the sharpest fold, a cosine times a radius; no clearance is asked of it."""
     along = [(end - start) / norm(end - start, _ROUNDING) for start, end in ends]
-    folds = [radius * (ca.dot(a, b) - FOLD) for a, b in itertools.pairwise(along)]
-    return ca.vertcat(SX.zeros(0, 1), *[segment_distance(*a, *b) - 2 * radius for a, b in pairs], *folds)
+    return ca.vertcat(SX.zeros(0, 1), *[radius * (ca.dot(a, b) - FOLD) for a, b in itertools.pairwise(along)])
 
 
 # Servos: balls about the joints, which are where links begin.

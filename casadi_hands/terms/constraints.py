@@ -189,6 +189,9 @@ GROUND_NO_SLIP = replace(
 )
 
 # A finger.
+UNFOLDED = Constraint(
+    "unfolded", "neighbouring links' sharpest fold", "length", "keep its links off each other", _ROOM, ("penetration",)
+)
 CLEAR = Constraint("clear", "eq. 2.20 as a bound", "length", "stay clear of the other bodies", _ROOM, ("penetration",))
 CLEAR_OF_EACH_OTHER = replace(CLEAR, cannot="stay clear of each other")
 WITHIN_SPEED = Constraint(

@@ -27,9 +27,11 @@ def fold(points: np.ndarray, joint: int) -> float:
     return RADIUS * ((across**2 - before**2 - after**2) / (2 * before * after) + 0.3)
 
 
-def of_one(points: np.ndarray) -> np.ndarray:
+def of_one(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Distances of links that are no neighbours, and how far neighbours are from the sharpest fold."""
     ends = [(ca.SX(a), ca.SX(b)) for a, b in itertools.pairwise(points)]
-    return np.asarray(ca.evalf(clearance.links_of_one(ends, ca.SX(RADIUS)))).ravel()
+    apart, unfolded = (term(ends, ca.SX(RADIUS)) for term in (clearance.links_of_one, clearance.unfolded))
+    return np.asarray(ca.evalf(apart)).ravel(), np.asarray(ca.evalf(unfolded)).ravel()
 
 
 def links(points: np.ndarray) -> list[tuple[ca.DM, ca.DM]]:
@@ -75,11 +77,12 @@ def test_links_of_two_fingers_and_of_one() -> None:
     ]
     np.testing.assert_allclose(found, expected, atol=5e-4)
     folds = [fold(JOINTS, 1), fold(JOINTS, 2)]
-    np.testing.assert_allclose(
-        of_one(JOINTS), [coal_distance(*JOINTS[:2], *JOINTS[2:], RADIUS, RADIUS), *folds], atol=5e-4
-    )
-    np.testing.assert_allclose(of_one(JOINTS[:3]), folds[:1], atol=5e-4)
-    assert of_one(JOINTS[:2]).size == 0
+    apart, unfolded = of_one(JOINTS)
+    np.testing.assert_allclose(apart, [coal_distance(*JOINTS[:2], *JOINTS[2:], RADIUS, RADIUS)], atol=5e-4)
+    np.testing.assert_allclose(unfolded, folds, atol=5e-4)
+    assert of_one(JOINTS[:3])[0].size == 0
+    np.testing.assert_allclose(of_one(JOINTS[:3])[1], folds[:1], atol=5e-4)
+    assert [each.size for each in of_one(JOINTS[:2])] == [0, 0]
 
 
 @pytest.mark.parametrize("degrees", [0, 30, 90, 107.4, 107.5, 108, 150, 180])
@@ -88,7 +91,7 @@ def test_neighbours_that_fold_no_sharper_than_allowed_are_clear_of_each_other(de
     angle = np.radians(degrees)
     along = np.array([0, np.sin(angle), np.cos(angle)])
     points = np.array([[0, 0, 0], [0, 0, 0.5], [0, 0, 0.5] + length * along])
-    (found,) = of_one(points)
+    (found,) = of_one(points)[1]
     assert found == pytest.approx(RADIUS * (np.cos(angle) + 0.3), abs=5e-4)
     # Bodies as they are built: each begins the shortest hinge off its joint.
     hinge = SHORTEST_HINGE * RADIUS

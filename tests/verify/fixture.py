@@ -187,7 +187,13 @@ def result(task: Task, hand: Hand, samples: int) -> dict[str, Any]:
             "name": f.name,
             "base": f.base,
             "links": [
-                {"length": s.length, "radius": s.radius, "axis": s.axis, "bend": s.bend, "hinge": s.hinge}
+                {
+                    "length": s.length,
+                    "radius": s.radius,
+                    "axis": Rotation.from_rotvec([*s.bend, 0.0]).apply(s.axis).tolist(),
+                    "bend": s.bend,
+                    "hinge": s.hinge,
+                }
                 for s in f.links
             ],
         }

@@ -151,9 +151,9 @@ def bind(of: Declaration) -> None:
         )
 
 
-def constraint_bounds(of: Declaration, what: str) -> dict[str, tuple[ArrayLike, ArrayLike]]:
+def constraint_bounds(of: Declaration, what: str, scale: float = 1.0) -> dict[str, tuple[ArrayLike, ArrayLike]]:
     """How far commands may be off their lines in a step."""
-    off = OFF_LINES[what]
+    off = scale * OFF_LINES[what]
     return {name: (-off, off) for name in of.problem.constraint_rows if name.endswith(".on_lines")}
 
 

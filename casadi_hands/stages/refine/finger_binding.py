@@ -127,7 +127,7 @@ def bind_clearance(of: Declaration, i: int) -> None:
         of.bind(
             knots,
             kernels.apart(n, model.kinds, skipped, model.ground is not None),
-            {"clear": (least, np.inf)},
+            {"clear": (least, np.inf), "unfolded": (0.0, np.inf)},
             (c,),
             f"{kind}{c}",
             **_shape(of, i, knots),

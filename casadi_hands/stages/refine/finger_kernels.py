@@ -242,6 +242,8 @@ def apart(joints: int, kinds: tuple[type[Body], ...], touched: int | None, groun
     clear, last = distances(here, radius, palm_radius, seen, up, ground - palm_position[2])
     others = [last[k] for k in range(len(kinds)) if k != touched]
     kernel.constrain(limits.CLEAR, ca.vertcat(clear, *others))
+    if joints > 1:
+        kernel.constrain(limits.UNFOLDED, clearance.unfolded(here.ends, radius))
     return kernel
 
 

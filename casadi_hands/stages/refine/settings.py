@@ -51,15 +51,26 @@ ALL_STEPS: tuple[Step, ...] = (
 # From an exact motion to one nearby; the first step can be left out where joints can follow and actuate the forces.
 NEARBY_STEPS: tuple[Step, ...] = (ALL_STEPS[1], ALL_STEPS[-1])
 # From an exact motion of independent joints to one whose commands are on few lines; what takes longer is not near.
+# The hand may change more than elsewhere.
+_FREER = {"stay_design": 1.0}
 COUPLING_STEPS: tuple[Step, ...] = (
-    ALL_STEPS[1],
-    ("hard constraints", WEIGHTS | HARD, replace(HARD_CONSTRAINTS, max_iter=80)),
+    ("stiff penalty", WEIGHTS | STIFF | _FREER, STIFF_PENALTY),
+    ("hard constraints", WEIGHTS | HARD | _FREER, replace(HARD_CONSTRAINTS, max_iter=80)),
 )
 LAST_STEP: tuple[Step, ...] = NEARBY_STEPS[-1:]
 # Of the slip with which friction is on its cone: with penalties, and of hard constraints one after another from there.
 VISCOUS = 100.0
 SHARPER = (VISCOUS, 30.0, 10.0, 3.0, 1.0)
 RENEWED_STEPS: tuple[Step, ...] = (("hard constraints", WEIGHTS | HARD, NEARBY),)
+
+
+# Times of what commands may be off their lines at last, of hard constraints one after another.
+CLOSER = (2000.0, 300.0, 30.0, 1.0)
+
+
+def closing(steps: tuple[Step, ...]) -> tuple[tuple[Step, float], ...]:
+    """Steps for joints that share motors, each with what multiplies how far commands may be off their lines."""
+    return (*((step, 1.0) for step in steps[:-1]), *((steps[-1], scale) for scale in CLOSER))
 
 
 def graded(steps: tuple[Step, ...]) -> tuple[tuple[Step, float], ...]:

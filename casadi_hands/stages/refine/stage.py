@@ -38,6 +38,7 @@ from casadi_hands.stages.refine.settings import (
     SPIN_SCALE,
     SPIN_WEIGHT,
     Step,
+    closing,
     graded,
 )
 from casadi_hands.stages.refine.sliding import SLIP_SCALE
@@ -122,7 +123,11 @@ class RefineStage:
         runs: list[Run] = []
         slips: dict[str, float] = {}
         most, hopeless = 0.0, max(HOPELESS, self.model.sliding)
-        graded_steps = graded(steps) if self.model.sliding else tuple((step, 1.0) for step in steps)
+        graded_steps = tuple((step, 1.0) for step in steps)
+        if self.model.sliding:
+            graded_steps = graded(steps)
+        elif start.coupling is not None and len(steps) > 1:
+            graded_steps = closing(steps)
         for (what, given_weights, options), scale in graded_steps:
             weights = self._all_weights(what, given_weights)
             most, before = max(slips.values(), default=0.0), most
@@ -134,7 +139,8 @@ class RefineStage:
                 break
             bounds = always | exact if what == "hard constraints" else always
             if start.coupling is not None:
-                low, high, lines = self._coupled(what, values, start.coupling)
+                off = 1.0 if self.model.sliding else scale
+                low, high, lines = self._coupled(what, values, start.coupling, off)
                 lower, upper, bounds = lower | low, upper | high, {**bounds, **lines}
             parameters |= self._weighted(weights) | self._slip_scale(scale) | self._spin_scale(what, sharp)
             solution = self.solver.solve(values, parameters, options, lower, upper, bounds)
@@ -147,12 +153,12 @@ class RefineStage:
         return replace(self._result(start, runs, slips or self._slips(solution), used), homotopy=homotopy)
 
     def _coupled(
-        self, what: str, values: dict[str, NDArray[np.float64]], begun: Coupling
+        self, what: str, values: dict[str, NDArray[np.float64]], begun: Coupling, scale: float
     ) -> tuple[dict[str, NDArray[np.float64]], dict[str, NDArray[np.float64]], Bounds]:
         """Bounds of motors and ratios in a step, and how far commands may be off their lines."""
         now = coupling.result(self.built, values, begun.leaders)
         low, high = coupling.bounds(self.built, now, self.model.ratios, what == "hard constraints")
-        return low, high, coupling.constraint_bounds(self.built, what)
+        return low, high, coupling.constraint_bounds(self.built, what, scale)
 
     def _restored(
         self,

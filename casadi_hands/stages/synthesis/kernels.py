@@ -76,8 +76,8 @@ def collide(joints: int, kinds: tuple[type[Body], ...]) -> Kernel:
     ]
     if joints > 1:
         apart.append(clearance.links_and_object(ends[:-1], radius, bodies))
-    touching = clearance.links_and_object(ends[-1:], radius, bodies)
-    kernel.cost(clearance.COLLISION, clearance.overlap(ca.vertcat(margin - ca.vertcat(*apart), -touching)))
+    touching, folds = clearance.links_and_object(ends[-1:], radius, bodies), clearance.unfolded(ends, radius)
+    kernel.cost(clearance.COLLISION, clearance.overlap(ca.vertcat(margin - ca.vertcat(*apart), -touching, -folds)))
     return kernel
 
 

@@ -97,7 +97,8 @@ def object_clearance(joints: int, kinds: tuple[type[Body], ...], moves: bool) ->
     here = symbols.placed(angles, radius)
     up = palm.turned(SX([0, 0, 1]))
     apart, touching = distances(here, radius, palm_radius, in_palm, up, ground - palm.position[2])
-    kernel.cost(clearance.COLLISION, clearance.overlap(ca.vertcat(margin - apart, -touching)))
+    folds = clearance.unfolded(here.ends, radius)
+    kernel.cost(clearance.COLLISION, clearance.overlap(ca.vertcat(margin - apart, -touching, -folds)))
     return kernel
 
 

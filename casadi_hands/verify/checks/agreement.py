@@ -223,7 +223,7 @@ def _link_problems(folder: Folder, name: str, stated: Any, parent: str, origin: 
     axis = as_array(entry(stated, "axis"), (3,))
     if axis is None or abs(float(np.linalg.norm(axis)) - 1.0) > 1e-6:
         problems.append(f"{who}: its axis in result.json is not a unit vector")
-    elif np.linalg.norm(axis - joint.axis) > 1e-6:
+    elif np.linalg.norm(axis - Rotation.from_euler("xyz", joint.turn).apply(joint.axis)) > 1e-6:
         problems.append(f"{who}: its axis in hand.urdf is not that of result.json")
     bend = as_array(entry(stated, "bend"), (2,)) if "bend" in stated else np.zeros(2)
     if bend is None:

@@ -128,8 +128,8 @@ class Witness:
                     for j in range(i + 2, len(chain))
                 ]
                 folds = folds_apart(chain, radius)
-                apart += folds
-                self.folded = max([self.folded, *(MARGIN - fold for fold in folds)])
+                total += float(g(-np.array(folds)).sum())
+                self.folded = max([self.folded, *(-fold for fold in folds)])
                 for capsule in rods(self.model.bodies, bodies[t]):
                     gaps = [segments_apart(*link, capsule[:3], capsule[3:6]) - radius - capsule[6] for link in chain]
                     apart += gaps[:-1]

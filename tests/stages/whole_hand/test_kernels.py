@@ -144,8 +144,8 @@ class Witness(ObjectWitness):
                 if len(chain) == 3:
                     apart.append(segments_apart(*chain[0], *chain[2]) - 2 * radius)
                 folds = folds_apart(chain, radius)
-                apart += folds
-                self.folded = max([self.folded, *(MARGIN - fold for fold in folds)])
+                total += float(g(-np.array(folds)).sum())
+                self.folded = max([self.folded, *(-fold for fold in folds)])
                 for capsule in map(rod, model.bodies):
                     ends = (self.in_palm(s, capsule[:3]), self.in_palm(s, capsule[3:6]))
                     gaps = [segments_apart(*link, *ends) - radius - capsule[6] for link in chain]
