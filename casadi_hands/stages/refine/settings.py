@@ -51,11 +51,9 @@ ALL_STEPS: tuple[Step, ...] = (
 # From an exact motion to one nearby; the first step can be left out where joints can follow and actuate the forces.
 NEARBY_STEPS: tuple[Step, ...] = (ALL_STEPS[1], ALL_STEPS[-1])
 # From an exact motion of independent joints to one whose commands are on few lines; what takes longer is not near.
-# The hand may change more than elsewhere.
-_FREER = {"stay_design": 1.0}
 COUPLING_STEPS: tuple[Step, ...] = (
-    ("stiff penalty", WEIGHTS | STIFF | _FREER, STIFF_PENALTY),
-    ("hard constraints", WEIGHTS | HARD | _FREER, replace(HARD_CONSTRAINTS, max_iter=80)),
+    ALL_STEPS[1],
+    ("hard constraints", WEIGHTS | HARD, replace(HARD_CONSTRAINTS, max_iter=80)),
 )
 LAST_STEP: tuple[Step, ...] = NEARBY_STEPS[-1:]
 # Of the slip with which friction is on its cone: with penalties, and of hard constraints one after another from there.
