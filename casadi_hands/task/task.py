@@ -71,7 +71,7 @@ class Task(Section):
     motors: Literal["independent", "fewest"] | Annotated[Whole, Field(ge=1)] = Field(
         default="independent",
         description="Motors of the hand: `independent`, one for every joint; `fewest`, as few as are found to turn all "
-        "joints by fixed ratios; or their number.",
+        "joints by fixed ratios; or their number. With servos in the joints, `independent`.",
     )
     limits: Limits = Field(default={}, validate_default=True, description="Limits of the certificate.")
     search: Search = Field(default=Search(), description="The search over structures.")
@@ -131,6 +131,16 @@ class Task(Section):
             return value
         stiffness = {} if servo.stiffness is None else {"stiffness": servo.stiffness}
         return fill(value, torque=servo.continuous, speed=servo.speed, **stiffness)
+
+    @field_validator("motors", mode="before")
+    @classmethod
+    def _motors(cls, value: Any, info: ValidationInfo) -> Any:
+        if value not in ("independent", "fewest") and not (type(value) is int and value >= 1):
+            raise refuse("independent, fewest, or a whole number of at least 1")
+        hand = info.data.get("hand")
+        if value != "independent" and hand and hand.drive.motor:
+            raise refuse("independent with hand.drive.servo: servos in every joint are motors of their own")
+        return value
 
     @field_validator("fingertip", mode="before")
     @classmethod

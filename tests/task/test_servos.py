@@ -68,3 +68,23 @@ def test_what_is_no_drive_is_refused(given: str, words: str) -> None:
     with pytest.raises(TaskError) as refused:
         parse_task(TEXT + f"hand: {{drive: {given}}}")
     assert words in str(refused.value)
+
+
+@pytest.mark.parametrize("given", ["fewest", "2"])
+def test_servos_in_the_joints_are_motors_of_their_own(given: str) -> None:
+    """A joint whose servo is in it shares no other: nothing pulls at it but that servo."""
+    with pytest.raises(TaskError) as refused:
+        parse_task(TEXT + f"hand: {{drive: {{servo: SG90}}}}\nmotors: {given}")
+    says = f"task:6: motors: given {given if given == '2' else repr(given)}; allowed: independent with hand.drive.servo"
+    assert str(refused.value).startswith(says)
+    assert "\n" not in str(refused.value)
+    assert parse_task(TEXT + "hand: {drive: {servo: SG90}}\nmotors: independent").motors == "independent"
+    assert str(parse_task(TEXT + f"motors: {given}").motors) == given
+
+
+@pytest.mark.parametrize("given", ["many", "1.5", "0", "true"])
+def test_what_is_no_number_of_motors_is_refused_once(given: str) -> None:
+    with pytest.raises(TaskError) as refused:
+        parse_task(TEXT + f"motors: {given}")
+    assert str(refused.value).endswith("; allowed: independent, fewest, or a whole number of at least 1")
+    assert str(refused.value).startswith("task:5: motors: given ")
