@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from casadi_hands.errors import DesignError
 from casadi_hands.export.commands import commanded, joint_torques
 from casadi_hands.export.urdf import hand_urdf
 from casadi_hands.problem.coupling import fit_coupling
@@ -160,6 +161,14 @@ def test_a_falsified_drive_is_found(what: str, good: Path, tmp_path: Path) -> No
     shutil.copytree(good, folder := tmp_path / "false")
     falsify(folder)
     assert any(re.search(words, problem) for problem in audit_files(folder).problems)
+
+
+def test_a_drive_of_no_motors_is_refused(good: Path, tmp_path: Path) -> None:
+    shutil.copytree(good, folder := tmp_path / "none")
+    in_record(lambda hand: hand.update(motors=0, ratios=[[] for _ in hand["ratios"]]))(folder)
+    in_motion(lambda values: values[:, :0])(folder)
+    with pytest.raises(DesignError, match=r"result\.json: motors that share joints are none: motor_positions has no"):
+        audit_files(folder)
 
 
 def test_replays_move_the_motors_alone(tmp_path: Path) -> None:

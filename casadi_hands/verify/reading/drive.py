@@ -44,7 +44,7 @@ def read_drive(path: Path, record: dict[str, Any], joints: int, motors: int | No
         motors: columns of the motion's ``motor_positions``; None where it has none.
 
     Raises:
-        DesignError: it is stated by halves, or not in numbers of these sizes.
+        DesignError: it is stated by halves, of no motors, or not in numbers of these sizes.
     """
     hand = record.get("hand")
     stated = [name for name in ("ratios", "offsets") if entry(hand, name) is not None]
@@ -54,6 +54,8 @@ def read_drive(path: Path, record: dict[str, Any], joints: int, motors: int | No
         raise DesignError(
             f"{path}: motors that share joints need hand.ratios, hand.offsets and motor_positions, all three"
         )
+    if motors == 0:
+        raise DesignError(f"{path}: motors that share joints are none: motor_positions has no column")
     ratios, offsets = as_array(entry(hand, "ratios"), (joints, motors)), as_array(entry(hand, "offsets"), (joints,))
     effort, velocity = (as_array(entry(hand, f"motor_{name}"), ()) for name in ("effort", "velocity"))
     if ratios is None or offsets is None:
