@@ -76,5 +76,9 @@ DISAGREEMENTS: Cases = {
         both(record("task_hash", drop=True), arrays(**KINEMATIC)),
         r"written by an earlier version \(no task_hash, no joint_commands\): `casadi-hands solve .*--from",
     ),
+    "an earlier version, of straight links": (
+        record("hand", "fingers", 0, "links", 1, "bend", drop=True),
+        r"written by an earlier version \(no bend\): `casadi-hands solve .*--from",
+    ),
     "a later certificate": (record("certificate", value={"slip": {"value": 0.5, "limit": 0.0002}}), r"certificate"),
 }

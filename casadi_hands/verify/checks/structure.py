@@ -48,5 +48,5 @@ def _version_problems(folder: Folder) -> list[str]:
         return []
     again = f"`casadi-hands solve {folder.path / 'task.yaml'} --from {folder.path}` makes it anew"
     absent = [name for name in ("joint_commands",) if getattr(folder.motion, name) is None]
-    lacks = ", ".join(f"no {name}" for name in ("task_hash", *absent))
+    lacks = ", ".join(f"no {name}" for name in (*folder.unstated, *absent))
     return [f"the folder was written by an earlier version ({lacks}): {again}"]

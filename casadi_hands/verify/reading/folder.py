@@ -19,7 +19,7 @@ from casadi_hands.verify.bodies import Body, ground_body
 from casadi_hands.verify.reading.drive import Drive, read_drive
 from casadi_hands.verify.reading.robot import Joint, Robot, read_robot
 from casadi_hands.verify.reading.scene_file import Scene, read_scene
-from casadi_hands.verify.reading.stored import read_motion, read_record
+from casadi_hands.verify.reading.stored import entry, read_motion, read_record
 from casadi_hands.verify.shapes import FORMS
 
 STANDARD_GRAVITY = 9.81
@@ -107,7 +107,16 @@ class Folder:
     @property
     def legacy(self) -> bool:
         """Whether an earlier version wrote the folder, which said less."""
-        return "task_hash" not in self.result
+        return bool(self.unstated)
+
+    @cached_property
+    def unstated(self) -> tuple[str, ...]:
+        """What an earlier version did not state in ``result.json``: the task's hash, bends of links."""
+        fingers = entry(self.result, "hand", "fingers")
+        links = [entry(finger, "links") for finger in (fingers if isinstance(fingers, list) else ())]
+        stated = [link for each in links if isinstance(each, list) for link in each if isinstance(link, dict)]
+        absent = {"task_hash": "task_hash" not in self.result, "bend": not all("bend" in link for link in stated)}
+        return tuple(name for name, lacks in absent.items() if lacks)
 
     def friction(self, contact: int) -> float:
         """Return the friction coefficient of the contact with this index."""
