@@ -12,6 +12,8 @@ from casadi_hands.verify.reading.scene_file import Scene
 from casadi_hands.verify.reading.stored import entry, same
 
 EXACT = 1e-6
+ROUNDED_RATIO = 1e-7
+"""By which a ratio may be out of its bounds: as much as a solve's constraints."""
 LEAST_STIFF = 10.0
 """Times its springs' stiffness, seen at its shaft, that a motor has at least: it is held where it is told to be."""
 
@@ -57,7 +59,7 @@ def _leader(drive: Drive, joint: int) -> tuple[int, float, float] | None:
 def _ratio_problems(folder: Folder, drive: Drive) -> list[str]:
     problems, (least, most) = [], folder.task.hand.ratios
     sizes, names = np.abs(drive.ratios), folder.motion.joint_names
-    for j, m in np.argwhere((sizes > 0) & ((sizes < least * (1 - EXACT)) | (sizes > most * (1 + EXACT)))):
+    for j, m in np.argwhere((sizes > 0) & ((sizes < least - ROUNDED_RATIO) | (sizes > most + ROUNDED_RATIO))):
         given = f"{drive.names[m]} turns joint {names[j]} by a ratio of {drive.ratios[j, m]:.4g}"
         problems.append(f"{given}; the task allows sizes from {least:g} to {most:g} (hand.ratios)")
     for m, name in enumerate(drive.names):
