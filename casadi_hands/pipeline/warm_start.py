@@ -46,7 +46,8 @@ def warm_start(earlier: Design, task: Task, model: Model) -> WholeHand:
 
     The object's path moves by the difference of the goals, blended smoothly from one to the next; contact points by the
     change of the task's contacts, and onto the object's surface; forces stay the same in terms of the object's weight.
-    Where goals are at other times, the motion in between is stretched.
+    Where goals are at other times, the motion in between is stretched. Motors that share joints are left out: every
+    joint has one of its own, from which fewer are fitted anew.
 
     Args:
         earlier: as loaded from a result folder.
