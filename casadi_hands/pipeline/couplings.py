@@ -1,8 +1,8 @@
 """Fewer motors than joints: a hand that is certified with a motor for every joint, refined with motors that share them.
 
-The commands of all joints are put on as many lines as there are motors, from the nearest such on. One motor is tried
-first, then one more and one more: the first hand that is certified, by the audit and by replays that move those
-motors alone, is taken.
+The commands of all joints are put on as many lines as there are motors, from the nearest such on. The number that the
+task asks for is tried; of `fewest` one motor, then one more and one more. The first hand that is certified, by the
+audit and by replays that move those motors alone, is taken.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from casadi_hands.export.design import Design
-from casadi_hands.pipeline.judge import Judge
+from casadi_hands.pipeline.judge import Judge, counted
 from casadi_hands.pipeline.record import STOPPED, Record
 from casadi_hands.pipeline.refiner import Refiner
 from casadi_hands.pipeline.warm_start import kept_margin, warm_start
@@ -25,7 +25,7 @@ FARTHEST = 0.35  # rad that commands may be off the nearest lines, for an exact 
 
 
 class Coupler:
-    """Looks for the fewest motors.
+    """Looks for the motors that a task asks for: their number, or the fewest.
 
     Args:
         record: of the solve.
@@ -45,7 +45,7 @@ class Coupler:
 
         Returns:
             The design itself where no fewer are asked for, or where it is not certified; where none is found, with
-            words on that.
+            words on that. Where a number is asked for, the certificate has it.
         """
         asked, hand = self.record.task.motors, design.hand
         if asked == "independent" or hand is None or design.motion is None:
@@ -53,12 +53,12 @@ class Coupler:
         if design.reason == STOPPED:
             design = replace(design, status="certified", reason="")
         joints = hand.degrees_of_freedom
-        least = asked if isinstance(asked, int) else 1
+        least, most = (asked, asked) if isinstance(asked, int) else (1, min(MOST, joints - 1))
         if design.status != "certified" or least >= joints:
-            return self.judge.counted(design)
+            return counted(design)
         whole, margin = warm_start(design, self.record.task, self.model), kept_margin(design)
         found = design
-        for motors in range(least, min(joints - 1, max(MOST, least)) + 1):
+        for motors in range(least, most + 1):
             model = replace(self.model, motors=motors)
             begun = coupled(model, whole, motors)
             if self._off(begun) > FARTHEST:
@@ -71,24 +71,23 @@ class Coupler:
                 found = tried
                 break
             self.record.log("refine", f"not with {drives}: {tried.reason}")
-        return self._told(found, least, joints)
+        return counted(found if found is not design else _without(design, most, joints))
 
     def _off(self, begun: WholeHand) -> float:
         """How far commands are off the lines that a motion begins with, rad."""
         assert begun.coupling is not None
         return float(np.abs(joint_commands(self.model, begun) - begun.coupling.commands).max())
 
-    def _told(self, design: Design, least: int, joints: int) -> Design:
-        """The design with the words on motors that were not found."""
-        assert design.hand is not None
-        motors, asked = design.hand.motors, self.record.task.motors
-        if motors == least or (asked == "fewest" and motors < joints):
-            return design
-        drive = f"1 motor drives all {joints} joints" if least == 1 else f"{least} motors drive all {joints} joints"
-        if asked == "fewest":
-            drive = f"{MOST} motors or fewer drive all {joints} joints"
-        words = f"no motion was found with which {drive}"
-        if motors < joints:
-            words += f"; the fewest found is {motors}"
-        why = f"{words}. {design.reason}" if design.reason else words
-        return self.judge.counted(replace(design, reason=why))
+
+def _without(design: Design, most: int, joints: int) -> Design:
+    """The design, a motor for every joint, with the words on motors that were not found.
+
+    Args:
+        design: certified.
+        most: motors that were tried.
+        joints: of the hand.
+    """
+    fewer = design.task.motors == "fewest" and most > 1
+    drive = "1 motor drives" if most == 1 else f"{most} motors{' or fewer' if fewer else ''} drive"
+    words = f"no motion was found with which {drive} all {joints} joints"
+    return replace(design, reason=f"{words}. {design.reason}" if design.reason else words)

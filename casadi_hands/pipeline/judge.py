@@ -39,6 +39,23 @@ FEASIBLE = {
 _LENGTHS = ("goal_position", "gap", "penetration")
 
 
+def counted(design: Design) -> Design:
+    """The design, where its task asks for a number of motors, with its own in the certificate.
+
+    Args:
+        design: judged. With more motors it is certified no more, and the reason says so, unless it has another.
+    """
+    asked, hand = design.task.motors, design.hand
+    if not isinstance(asked, int) or hand is None or not design.certificate:
+        return design
+    where, holds = f"the hand has {hand.motors} motors, the task asks for {asked} (motors)", hand.motors <= asked
+    figure = {"value": float(hand.motors), "limit": float(asked), "holds": holds, "unit": "", "where": where}
+    design = replace(design, certificate={**design.certificate, "motors": figure})
+    if holds or design.status != "certified":
+        return design
+    return replace(design, status="feasible", reason=design.reason or where)
+
+
 class Judge:
     """Judges the designs of one solve.
 
@@ -106,16 +123,6 @@ class Judge:
             save_design(judged, Path(files), page=False)
             remedy = motor_remedy(files, judged)
         return judged if remedy is None else replace(judged, reason=f"{judged.reason}. {remedy}")
-
-    def counted(self, design: Design) -> Design:
-        """The design, certified no more where it has more motors than the task asks for."""
-        asked, hand = design.task.motors, design.hand
-        if not isinstance(asked, int) or hand is None or hand.motors <= asked:
-            return design
-        where = f"{hand.motors} motors, {asked} asked for (motors)"
-        figure = {"value": float(hand.motors), "limit": float(asked), "holds": False, "unit": "", "where": where}
-        status = "feasible" if design.status == "certified" else design.status
-        return replace(design, status=status, certificate={**design.certificate, "motors": figure})
 
     def audited(self, design: Design) -> Audit:
         """What the audit finds in a design's files; of the same hand and motion as the last time, what it found."""

@@ -19,7 +19,7 @@ from casadi_hands.export.design import Design
 from casadi_hands.nlp import SolverError
 from casadi_hands.pipeline.certify import Certifier
 from casadi_hands.pipeline.couplings import Coupler
-from casadi_hands.pipeline.judge import Judge
+from casadi_hands.pipeline.judge import Judge, counted
 from casadi_hands.pipeline.record import STAGES, Progress, Record
 from casadi_hands.pipeline.refiner import Refiner
 from casadi_hands.pipeline.steps import adopt, prepare_search, run_floating, run_search, run_whole_hand
@@ -95,11 +95,14 @@ def solve(
         except SolverError as error:
             _LOG.debug("the solve broke off", exc_info=True)
             design = record.broken_off(error)
-        return record.keep(design)
+        return record.keep(counted(design))
 
 
 def _refine_again(record: Record, start: Path) -> Design | None:
-    """The hand and the motion of an earlier result, refined for the task as it is now; None if another is needed."""
+    """The hand and the motion of an earlier result, refined for the task as it is now; None if another is needed.
+
+    Motors that share joints are looked for anew, from a motor for every joint.
+    """
     earlier, model = Design.load(start), _model(record)
     whole, margin = warm_start(earlier, record.task, model), kept_margin(earlier)
     adopt(record, model, whole)
@@ -109,7 +112,9 @@ def _refine_again(record: Record, start: Path) -> Design | None:
     record.update(stages=[{**run, "started_from": str(start)} for run in record.design.stages])
     record.update_best(design)
     if design.status == "certified":
-        return Coupler(record, model, judge, 1).run(design)
+        design = Coupler(record, model, judge, 1).run(design)
+    if design.status == "certified":
+        return design
     record.log("refine", f"from the earlier result no hand is certified: {design.reason}; now all stages")
     record.update(hand=None, motion=None, costs={})
     return None

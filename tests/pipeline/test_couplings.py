@@ -13,10 +13,11 @@ from casadi_hands.export.design import Design
 from casadi_hands.pipeline import couplings
 from casadi_hands.pipeline.alternatives.ranking import rank
 from casadi_hands.pipeline.couplings import Coupler
-from casadi_hands.pipeline.judge import Judge
+from casadi_hands.pipeline.judge import Judge, counted
 from casadi_hands.pipeline.record import Record, rank_of
 from casadi_hands.problem.coupling import Coupling
 from casadi_hands.problem.drive import Drive
+from casadi_hands.problem.hand import Finger
 from tests.export.example import example_hand, example_motion, example_task
 from tests.pipeline.replayed import replayed
 
@@ -44,9 +45,17 @@ class Start:
         self.coupling = Coupling(np.ones((6, motors)), np.zeros(6), np.zeros((2, motors)), tuple(range(motors)))
 
 
-def looked_for(monkeypatch: pytest.MonkeyPatch, asked: Any, works: int) -> tuple[Design, list[int]]:
+def looked_for(monkeypatch: pytest.MonkeyPatch, asked: Any, works: int, joints: int = 6) -> tuple[Design, list[int]]:
     """The design that is handed over, and the numbers of motors tried, where so many and more work."""
     design, tried = own_motors(asked), list[int]()
+    assert design.hand is not None
+    left, fingers = joints, list[Finger]()
+    for finger in design.hand.fingers:
+        fingers += [replace(finger, links=finger.links[:left])] if left else []
+        left = max(0, left - len(finger.links))
+    design = replace(design, hand=replace(design.hand, fingers=tuple(fingers)))
+    assert design.hand is not None
+    assert design.hand.degrees_of_freedom == joints
 
     class Refiner:
         def __init__(self, record: Record, model: Any, judge: Judge, jobs: int) -> None:
@@ -80,12 +89,31 @@ def test_the_fewest_that_are_certified_are_taken_from_where_lines_are_near(monke
     assert (found.status, found.hand.motors, found.reason) == ("certified", 3, "")
 
 
-def test_a_number_out_of_reach_is_not_certified_and_the_reason_has_the_fewest(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_a_number_only_that_is_tried_and_out_of_reach_it_is_not_certified(monkeypatch: pytest.MonkeyPatch) -> None:
     found, tried = looked_for(monkeypatch, 2, works=3)
-    assert tried == [2, 3]
+    assert tried == [2]
     assert found.status == "feasible"
-    assert found.reason == "no motion was found with which 2 motors drive all 6 joints; the fewest found is 3"
+    assert found.reason == "no motion was found with which 2 motors drive all 6 joints"
     assert found.missed == {"motors"}
+
+
+def test_the_certificate_has_the_number_that_is_asked_for_and_met(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, tried = looked_for(monkeypatch, 3, works=2)
+    assert (tried, found.status) == ([3], "certified")
+    figure = found.certificate["motors"]
+    assert (figure["value"], figure["limit"], figure["holds"]) == (3.0, 3.0, True)
+    met, more = (counted(with_motors(own_motors(2), motors)) for motors in (2, 4))
+    assert (met.status, met.certificate["motors"]["holds"], met.reason) == ("certified", True, "")
+    assert (more.status, more.missed) == ("feasible", {"motors"})
+    assert more.reason == "the hand has 4 motors, the task asks for 2 (motors)"
+    assert "motors" not in counted(with_motors(own_motors("fewest"), 2)).certificate
+
+
+def test_of_a_small_hand_no_more_motors_are_spoken_of_than_could_share_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    for joints, words in ((2, "1 motor drives all 2 joints"), (3, "2 motors or fewer drive all 3 joints")):
+        found, tried = looked_for(monkeypatch, "fewest", works=9, joints=joints)
+        assert tried == [n for n in range(2, joints)]
+        assert found.reason == f"no motion was found with which {words}"
 
 
 def test_where_none_share_joints_the_hand_is_kept_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -104,6 +132,7 @@ def test_nothing_is_looked_for_where_every_joint_may_have_its_own(monkeypatch: p
     assert tried == []
     due = own_motors(asked)
     assert (found.status, found.reason, found.hand, found.missed) == ("certified", "", due.hand, set())
+    assert ("motors" in found.certificate) == isinstance(asked, int)
 
 
 def test_fewer_motors_are_better_than_fewer_drops_and_fewer_joints() -> None:

@@ -13,6 +13,8 @@ from casadi_hands.errors import DesignError, SolveError
 from casadi_hands.export.design import Design
 from casadi_hands.nlp import Options, Solver, SolverError
 from casadi_hands.pipeline import Progress, run, solve
+from casadi_hands.pipeline.couplings import Coupler
+from casadi_hands.pipeline.judge import counted
 from casadi_hands.pipeline.record import Record
 from casadi_hands.pipeline.refiner import Refiner
 from casadi_hands.task import parse_task
@@ -108,6 +110,33 @@ def test_where_it_does_not_serve_all_stages_are_run_and_know_of_it(
     assert design.hand is not None
     assert design.status == "feasible"
     assert any(words in word.text for word in news)
+
+
+def test_where_motors_out_of_reach_keep_the_earlier_hand_from_its_certificate_all_stages_are_run(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And the hand that is handed over has the number in its certificate, whichever way it came."""
+    refined_as(monkeypatch, "certified", 0)
+    out_of_reach: list[Design] = []
+
+    def without(self: Coupler, design: Design) -> Design:
+        out_of_reach.append(design)
+        return counted(design)
+
+    monkeypatch.setattr(Coupler, "run", without)
+    ran: list[Record] = []
+
+    def all_stages(record: Record, until: str, executor: Any, jobs: int) -> Design:
+        ran.append(record)
+        return replace(record.design, hand=out_of_reach[0].hand, status="certified", reason="", certificate={"gap": {}})
+
+    monkeypatch.setattr(run, "_run", all_stages)
+    task = parse_task(HELD).model_copy(update={"motors": 1})
+    design = solve(task, jobs=1, start=folder)
+    assert len(out_of_reach) == len(ran) == 1
+    assert design.status == "feasible"
+    assert design.certificate["motors"]["limit"] == 1.0
+    assert design.reason.endswith("motors, the task asks for 1 (motors)")
 
 
 def test_what_cannot_be_started_from_is_refused_before_anything_is_written(folder: Path, tmp_path: Path) -> None:
