@@ -117,6 +117,22 @@ IN_THE_SCENE: Cases = {
         task("stiffness: 1.0}", "stiffness: 1.0, damping: 0.5}"),
         r"the motor of joint finger0_joint0 has a damping of 0\.\d+ N·m·s/rad, the task's 0\.5",
     ),
+    "motors that brake harder": (
+        edited(SCENE, ".//position", lambda e, p: e.set("kv", str(1.01 * float(e.get("kv", "")))), every=True),
+        r"the motor of joint finger0_joint0 has a damping of 0\.\d+ N·m·s/rad, the critical one is 0\.\d+",
+    ),
+    "a motor that drives itself": (
+        attribute(SCENE, ".//position", "kv", lambda v: f"-{v}"),
+        r"the motor of joint finger0_joint0 has a damping of -0\.\d+",
+    ),
+    "a heavy rotor": (
+        attribute(SCENE, BODY + "/joint", "armature", "1e-3"),
+        r"joint finger0_joint1: its rotor has 0\.001 kg·m², on the task's stiffness it is 2\.5e-05",
+    ),
+    "no rotor": (
+        attribute(SCENE, BODY + "/joint", "armature", None),
+        r"joint finger0_joint1: its rotor has 0 kg·m²",
+    ),
     "a motor less": (removed(SCENE, ".//position[@joint='finger2_joint1']"), r"its actuators turn"),
     "a motor on the object": (added(SCENE, "actuator", "<motor joint='object'/>"), r"<motor> in <actuator>"),
     "a tendon": (added(SCENE, ".", "<tendon/>"), r"<tendon> in <mujoco"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from casadi_hands.verify.checks.motors import damping_problem, shared_motor_problems
 from casadi_hands.verify.figures.coupling import motor_speeds
 from casadi_hands.verify.figures.wrench import planned_torques
 from casadi_hands.verify.reading.drive import Drive
@@ -14,8 +15,6 @@ from casadi_hands.verify.reading.stored import entry, same
 EXACT = 1e-6
 ROUNDED_RATIO = 1e-7
 """By which a ratio may be out of its bounds: as much as a solve's constraints."""
-LEAST_STIFF = 10.0
-"""Times its springs' stiffness, seen at its shaft, that a motor has at least: it is held where it is told to be."""
 
 
 def drive_problems(folder: Folder) -> list[str]:
@@ -88,21 +87,10 @@ def scene_drive_problems(folder: Folder, scene: Scene, drive: Drive) -> list[str
     task, names, problems = folder.task, list(folder.motion.joint_names), []
     if [servo.joint for servo in scene.servos] != drive.names:
         problems.append(f"its actuators turn other than {', '.join(drive.names)}, in this order")
-    shafts = task.actuator.stiffness * np.sum(drive.ratios**2, axis=0)
     for servo in scene.servos:
         if not np.allclose(servo.limits, [-drive.effort, drive.effort], rtol=EXACT, atol=0.0):
             problems.append(f"the torque of {servo.joint} is not limited to motor_effort of result.json")
-        if servo.joint in drive.names:
-            springs = shafts[drive.names.index(servo.joint)]
-            if servo.stiffness < LEAST_STIFF * springs or servo.damping < 0.0:
-                problems.append(f"{servo.joint}, at {servo.stiffness:.4g} N·m/rad, hardly stays where it is told to be")
-    for name in drive.names:
-        body = scene.bodies.get(name)
-        hinges = () if body is None else body.hinges
-        if len(hinges) != 1 or hinges[0].name != name or hinges[0].reference != 0.0:
-            problems.append(f"{name} is not a body with one joint of that name")
-        elif body is not None and (body.parent != "world" or body.geoms or body.free or body.mocap):
-            problems.append(f"{name} is not a motor that turns in place")
+    problems += shared_motor_problems(folder, scene, drive)
     if [spring.name for spring in scene.springs] != names:
         return [*problems, "its springs are not one a joint, in their order"]
     for j, spring in enumerate(scene.springs):
@@ -116,7 +104,5 @@ def scene_drive_problems(folder: Folder, scene: Scene, drive: Drive) -> list[str
         if not same(spring.stiffness, task.actuator.stiffness):
             stated = f"{spring.stiffness:.4g} N·m/rad, the task's {task.actuator.stiffness:.4g}"
             problems.append(f"the spring of joint {spring.name} has {stated}")
-        named = task.actuator.damping
-        if spring.damping < 0.0 or (named is not None and not same(spring.damping, named)):
-            problems.append(f"the spring of joint {spring.name} has a damping of {spring.damping:.4g} N·m·s/rad")
+        problems += damping_problem(folder, f"the spring of joint {spring.name}", spring.name, spring.damping)
     return problems

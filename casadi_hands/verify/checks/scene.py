@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from casadi_hands.verify.bodies import Body
 from casadi_hands.verify.checks.drive import scene_drive_problems
 from casadi_hands.verify.checks.keyframes import keyframe_problems
+from casadi_hands.verify.checks.motors import damping_problem, rotor_problems
 from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.reading.scene_file import Scene, SceneBody
 from casadi_hands.verify.reading.stored import same
@@ -29,6 +30,7 @@ def scene_problems(folder: Folder) -> list[str]:
         *_world_problems(folder, scene),
         *_body_problems(folder, scene),
         *_hold_problems(folder, scene),
+        *rotor_problems(folder, scene),
         *(
             _servo_problems(folder, scene)
             if folder.drive is None
@@ -191,10 +193,5 @@ def _servo_problems(folder: Folder, scene: Scene) -> list[str]:
         if not same(servo.stiffness, folder.task.actuator.stiffness):
             due = folder.task.actuator.stiffness
             problems.append(f"the motor of joint {servo.joint} has {servo.stiffness:.4g} N·m/rad, the task's {due:.4g}")
-        damping = folder.task.actuator.damping
-        if damping is not None and not same(servo.damping, damping):
-            stated = f"has a damping of {servo.damping:.4g} N·m·s/rad, the task's {damping:.4g}"
-            problems.append(f"the motor of joint {servo.joint} {stated}")
-        if servo.damping < 0.0:
-            problems.append(f"the actuator of joint {servo.joint} drives itself: its kv is {servo.damping:.4g}")
+        problems += damping_problem(folder, f"the motor of joint {servo.joint}", servo.joint, servo.damping)
     return problems

@@ -40,12 +40,13 @@ class Geom:
 
 @dataclass(frozen=True)
 class Hinge:
-    """A joint that turns: axis (3,), reference angle and limits (2,), rad."""
+    """A joint that turns: axis (3,), reference angle and limits (2,), rad, and its rotor's inertia, kg·m²."""
 
     name: str
     axis: np.ndarray
     reference: float
     limits: np.ndarray
+    armature: float
 
 
 @dataclass(frozen=True)
@@ -257,13 +258,13 @@ def _read_looks(path: Path, element: Element) -> None:
 
 def _read_hinge(path: Path, scene: Scene, element: Element) -> Hinge:
     scene.strange.extend(strangers(element, "", "name axis ref limited range armature"))
-    number(path, element, "armature", "0")
+    name, armature = element.get("name", ""), number(path, element, "armature", "0")
     axis, reference = numbers(path, element, "axis", 3), number(path, element, "ref", "0")
     if element.get("limited") == "false" and element.get("range") is None:
-        return Hinge(element.get("name", ""), axis, reference, np.array([-np.inf, np.inf]))
+        return Hinge(name, axis, reference, np.array([-np.inf, np.inf]), armature)
     if element.get("limited") != "true":
         scene.strange.append(f"{called(element)} has no limits: limited is not true")
-    return Hinge(element.get("name", ""), axis, reference, numbers(path, element, "range", 2))
+    return Hinge(name, axis, reference, numbers(path, element, "range", 2), armature)
 
 
 def _read_geom(path: Path, scene: Scene, element: Element) -> Geom:
