@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from casadi_hands.errors import DesignError
+from casadi_hands.errors import DesignError, HandsError
 from casadi_hands.export.commands import commanded, joint_torques
 from casadi_hands.export.urdf import hand_urdf
 from casadi_hands.problem.coupling import fit_coupling
@@ -22,7 +22,10 @@ from casadi_hands.verify import Perturbation, replay
 from casadi_hands.verify.audit import audit_files
 from casadi_hands.verify.figures.coupling import coupling_figures
 from casadi_hands.verify.reading.folder import read_folder
-from casadi_hands.verify.replays.simulation import Simulation
+from casadi_hands.verify.replays.replay import ENGINES
+from casadi_hands.verify.replays.series import stronger_motors
+from casadi_hands.verify.replays.simulation import SUPPORT, Plan, Simulation
+from tests.verify.falsify import both
 from tests.verify.fixture import Scene, carried, result
 
 MOTORS = 3
@@ -127,6 +130,7 @@ def in_motion(change: Callable[[np.ndarray], np.ndarray]) -> Falsify:
     return falsify
 
 
+MOTOR = ".//body[@name='motor1']"
 FALSE: dict[str, tuple[Falsify, str]] = {
     "another ratio": (in_record(other_ratio), r"joint_commands: .* where the motors of result\.json turn it"),
     "another offset": (
@@ -143,7 +147,41 @@ FALSE: dict[str, tuple[Falsify, str]] = {
     "a stiffer spring": (in_file("scene.xml", "tendon/fixed", "stiffness", "50"), r"the spring of joint .* has 50"),
     "a spring at rest elsewhere": (in_file("scene.xml", "tendon/fixed", "springlength", "0.9"), r"rests at 0\.9"),
     "another pulley": (in_file("scene.xml", "tendon/fixed/joint", "coef", "2"), r"does not pull by the ratios"),
-    "a soft motor": (in_file("scene.xml", "actuator/position", "kp", "0.01"), r"hardly stays where it is told"),
+    "a soft motor": (
+        in_file("scene.xml", "actuator/position", "kp", "0.01"),
+        r"motor0 is held .* with 0\.01 N·m/rad, not",
+    ),
+    "a motor that drags": (in_file("scene.xml", "actuator/position", "kv", "9"), r"motor0 is held .* with 9 N·m·s/rad"),
+    "an actuator of another name": (
+        in_file("scene.xml", "actuator/position", "name", "motor9"),
+        r"the actuator of motor0 is called motor9",
+    ),
+    "a spring that drags": (
+        in_file("scene.xml", "tendon/fixed", "damping", "1"),
+        r"the spring of joint finger0_joint0 has a damping of 1 N·m·s/rad, the critical one is 0\.\d+",
+    ),
+    "a heavy pulley": (
+        in_file("scene.xml", ".//body[@name='finger0_link1']/joint", "armature", "1e-3"),
+        r"joint finger0_joint1: its rotor has 0\.001 kg·m², on the task's stiffness it is 2\.5e-05",
+    ),
+    "a heavy rotor": (in_file("scene.xml", MOTOR + "/joint", "armature", "1"), r"the rotor of motor1 has 1 kg·m²"),
+    "a motor of another mass": (in_file("scene.xml", MOTOR + "/inertial", "mass", "5"), r"the body of motor1 is not"),
+    "a motor of another inertia": (
+        in_file("scene.xml", MOTOR + "/inertial", "fullinertia", "1 1 1 0 0 0"),
+        r"the body of motor1 is not",
+    ),
+    "a motor with its mass off its axis": (
+        in_file("scene.xml", MOTOR + "/inertial", "pos", "0.1 0 0"),
+        r"motor1 does not turn about z at the world's origin",
+    ),
+    "a motor elsewhere": (in_file("scene.xml", MOTOR, "pos", "0 0 1"), r"motor1 does not turn about z at the world's"),
+    "a motor with limits": (
+        both(
+            in_file("scene.xml", MOTOR + "/joint", "limited", "true"),
+            in_file("scene.xml", MOTOR + "/joint", "range", "-0.1 0.1"),
+        ),
+        r"motor1 has limits; only its torque has",
+    ),
     "a motor that pushes harder": (
         in_file("scene.xml", "actuator/position", "forcerange", "-9 9"),
         r"the torque of motor0 is not limited",
@@ -184,6 +222,25 @@ def test_replays_move_the_motors_alone(tmp_path: Path) -> None:
     own = replay(carried(tmp_path / "task").write(tmp_path / "own"))
     assert abs(outcome.position_max - own.position_max) < 1e-3
     assert abs(outcome.angle_max - own.angle_max) < 1.0
+
+
+def test_what_no_spring_can_be_told_is_refused_and_not_tried(good: Path) -> None:
+    with pytest.raises(HandsError, match=r"squeeze: given 1\.5; allowed: 1, since motors that share joints"):
+        replay(good, Perturbation(squeeze=1.5))
+    assert list(stronger_motors(good)) == []
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "drake"])
+def test_springs_press_at_once_where_the_object_is_off_its_place(engine: str, good: Path) -> None:
+    """So nothing bears it beside the support, on which it sags by g / SUPPORT² as a critically damped spring does."""
+    pytest.importorskip("mujoco" if engine == "mujoco" else "pydrake")
+    folder, heights = read_folder(good), list[float]()
+    scene = ENGINES[engine](folder, Perturbation(start_shift=(1.0, 0.0, 0.0)))
+    home = scene.object_pose()[0][2].copy()
+    scene.settle(Plan(folder, scene.step), lambda *_: heights.append(scene.object_pose()[0][2] - home))
+    for time in (0.05, 0.1, 0.25):
+        due = -9.81 / SUPPORT**2 * (1 - (1 + SUPPORT * time) * np.exp(-SUPPORT * time))
+        assert heights[round(time / scene.step) - 1] == pytest.approx(due, rel=0.05)
 
 
 def test_perturbations_change_springs(good: Path) -> None:

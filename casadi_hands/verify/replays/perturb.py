@@ -31,14 +31,17 @@ class Perturbation:
         mass: factor of the object's mass and inertia.
         friction: factor of every friction coefficient, sliding and torsional.
         torsion: factor of torsional friction, on top of that.
-        joint_bias: (J,) rad by which the joints' sensors are off; None for none.
+        joint_bias: (J,) rad by which the joints' sensors are off, where joints share motors, their springs' places of
+            rest; None for none.
         push: (3,) N at the object's centre of mass, world.
         push_start, push_end: s after the motion starts.
         start_shift: (3,) m by which the object starts off its place, world.
         start_turn: (3,) rad, rotation vector by which it starts turned, world.
         stiffness: factor of the motors' stiffness; they stay as damped, relative to critical, and press as planned.
+            Where joints share motors, of their springs; the motors turn as planned, so springs press by that factor.
         effort: factor of the motors' torque limits.
-        squeeze: factor of what the commands are ahead of the planned angles, and so of the grip.
+        squeeze: factor of what the commands are ahead of the planned angles, and so of the grip; 1 where joints share
+            motors, which are ahead of nothing.
         link_mass: factor of the links' masses and inertias; the hand carries what they weigh as planned.
         delay: s by which the motors get their set points late; palm, and what the task itself exerts, keep their time.
     """

@@ -203,7 +203,18 @@ class Player:
         self.plan: Plan | None = None
 
     def play(self, perturbation: Perturbation, observer: Observer | None = None) -> Replay:
-        """Play the motion from its start to its end."""
+        """Play the motion from its start to its end.
+
+        Raises:
+            DesignError: ``scene.xml`` is missing, or not of this hand.
+            HandsError: the engine cannot be loaded, or cannot be told of the perturbation; joints that share motors
+                shall press harder, which no position of these does.
+        """
+        if self.folder.drive is not None and perturbation.squeeze != 1.0:
+            raise HandsError(
+                f"squeeze: given {perturbation.squeeze:g}; allowed: 1, since motors that share joints press by how "
+                "stiff springs are: change stiffness"
+            )
         folder, scene = self.folder, self._enter(self.folder, perturbation)
         self.plan = plan = self.plan or Plan(folder, scene.step)
         scene.settle(plan, observer)

@@ -169,6 +169,8 @@ def run_replays(
 def stronger_motors(directory: str | Path) -> Iterator[tuple[Perturbation, Replays]]:
     """Replay as planned with motors that press harder, and have the torque for that, then with stiffer ones.
 
+    Where joints share motors, none are played: springs press, not motors.
+
     Args:
         directory: the result folder.
 
@@ -176,6 +178,8 @@ def stronger_motors(directory: str | Path) -> Iterator[tuple[Perturbation, Repla
         what was changed, and how it went.
     """
     player = Player(directory)
+    if player.folder.drive is not None:
+        return
 
     def played_with(change: Perturbation) -> tuple[Perturbation, Replays]:
         seen = player.play(change)
