@@ -27,9 +27,11 @@ class Actuation(Protocol):
 
     Attributes:
         indices: (N,) of its actuators in the model.
+        ramps: whether it can be told to press less, and so to squeeze by and by.
     """
 
     indices: np.ndarray
+    ramps: bool
 
     def perturb(self, model: Any, perturbation: Perturbation) -> None:
         """Change the model as the perturbation says."""
@@ -40,6 +42,8 @@ class Actuation(Protocol):
 
 class OwnMotors:
     """A position-controlled motor at every joint."""
+
+    ramps = True
 
     def __init__(self, mujoco: Any, model: Any, folder: Folder, file: Path) -> None:
         """Look up the joints' actuators.
@@ -69,6 +73,8 @@ class OwnMotors:
 
 class SharedMotors:
     """Motors that share joints: they alone are told anything, and what the springs do follows."""
+
+    ramps = False
 
     def __init__(self, mujoco: Any, model: Any, folder: Folder, drive: Drive, file: Path) -> None:
         """Look up motors and springs.

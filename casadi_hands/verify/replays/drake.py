@@ -206,7 +206,8 @@ class DrakeSimulation:
             force, torque, squeeze = np.zeros(3), np.zeros(3), 1.0
             if self._displaced:
                 time = i * self.step
-                squeeze = min(time / SQUEEZE, 1.0)
+                # Springs of joints that share motors press in full at once.
+                squeeze = min(time / SQUEEZE, 1.0) if self._drive is None else 1.0
                 force, torque = self._support(1.0 - max(0.0, time - SQUEEZE) / RELEASE)
                 # What the fingers do not bear yet: on its springs alone the object would sag and be gripped there.
                 force = force - (1.0 - squeeze) * self._mass * self._plant.gravity_field().gravity_vector()

@@ -224,10 +224,11 @@ class Simulation:
         told = np.maximum(np.arange(len(plan)) - self._late, 0)
         self._set_points, ahead = self._motors.set_points(plan, told, self._perturbation)
         displaced = self._perturbation.displaced
+        ramps = displaced and self._motors.ramps
         for i in range(round((SQUEEZE + RELEASE) / self.step)):
             time = i * self.step
             share = 1.0 - max(0.0, time - SQUEEZE) / RELEASE if displaced else 0.0
-            squeeze = min(time / SQUEEZE, 1.0) if displaced else 1.0
+            squeeze = min(time / SQUEEZE, 1.0) if ramps else 1.0
             force, torque = self._support(share) if share else (np.zeros(3), np.zeros(3))
             # What the fingers do not bear yet: on its springs alone the object would sag and be gripped there.
             unborne = -(1.0 - squeeze) * self.model.body_mass[self._object] * self.model.opt.gravity
