@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 OUT_OF_REACH = 0.3  # lengths that a finger misses its contact by: nothing is left to refine
 SURELY = np.pi / 2  # that an object may turn so that contacts can surely go with it
 MOBILE = 3  # ways to go of object and joints together, with which it depends on the hand whether contacts must slip
-HANDS_REFINED = 2  # hands of one structure that are tried, and more only where nothing else is left to try
+HANDS_REFINED = 2  # hands of one structure that roll and are tried, and more only where nothing else is left to try
 
 
 class Certifier:
@@ -62,9 +62,10 @@ class Certifier:
             return self.record.update_best(self.record.held_to_bounds(self.judge.judge(self.record.design, short)))
         while True:
             failing: set[str] = set()
-            for k, candidate in enumerate(found.candidates):
+            rolling = 0  # hands that could roll
+            for candidate in found.candidates:
                 may_grow = self._more_joints(found, failing) is not None
-                if k >= HANDS_REFINED and may_grow:
+                if rolling >= HANDS_REFINED and may_grow:
                     break
                 judged, refined = self._certify(candidate, short)
                 best = self.record.update_best(judged)
@@ -74,6 +75,7 @@ class Certifier:
                 failing |= failing_fingers(self.model, refined)
                 if refined.barely_rolls and _mobility(candidate.joints) < MOBILE:
                     break  # a structure that must slip will do so in any of its hands
+                rolling += not refined.barely_rolls
             least = self._more_joints(found, failing)
             if least is None:
                 return best
