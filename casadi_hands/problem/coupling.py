@@ -53,9 +53,10 @@ def fit_coupling(commands: Array, motors: int, weights: Array) -> Coupling:
         The coupling. No ratio is much larger than 1: the leaders are joints whose rows span most.
     """
     middle = commands.mean(axis=0)
-    _, _, rows = np.linalg.svd((commands - middle) * weights, full_matrices=False)
-    lines = np.zeros((commands.shape[1], motors))
-    lines[:, : len(rows[:motors])] = rows[:motors].T / weights[:, None]
+    # Of fewer samples than joints all directions are asked for, so that there are as many lines as motors.
+    few = len(commands) < commands.shape[1]
+    _, _, rows = np.linalg.svd((commands - middle) * weights, full_matrices=few)
+    lines = rows[:motors].T / weights[:, None]
     leaders = _leaders(lines)
     ratios = lines @ np.linalg.inv(lines[leaders])
     spread = ratios * weights[:, None]

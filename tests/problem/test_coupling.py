@@ -48,6 +48,15 @@ def test_more_motors_than_the_commands_need_stand_still_or_share(rng: np.random.
     assert np.isfinite(fit_coupling(commands + 1e-9 * rng.normal(size=commands.shape), 3, np.ones(JOINTS)).ratios).all()
 
 
+@pytest.mark.parametrize("samples", [1, 2, 3])
+def test_fewer_samples_than_motors_are_met(samples: int, rng: np.random.Generator) -> None:
+    commands = rng.normal(size=(samples, JOINTS))
+    found = fit_coupling(commands, 3, rng.uniform(0.2, 2.0, JOINTS))
+    np.testing.assert_allclose(found.commands, commands, atol=1e-10)
+    np.testing.assert_array_equal(found.ratios[list(found.leaders)], np.eye(3))
+    assert np.abs(found.ratios).max() < 1.02
+
+
 def test_motors_do_the_work_of_joints(rng: np.random.Generator) -> None:
     """Power: what motors exert, times how fast they turn, is what the springs exert, times how fast commands go."""
     ratios = np.array([[1.0, 0.0], [0.0, 1.0], [-0.5, 0.0], [0.7, -1.3]])
