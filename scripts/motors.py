@@ -43,7 +43,7 @@ def main() -> None:
     records = {path: json.loads((path / "result.json").read_text(encoding="utf-8")) for path in given.folders}
     rows = [row(record, beside(given.beside, path)) for path, record in records.items()]
     write_table(HEAD, rows, given.out)
-    certified = [record["hand"]["motors"] for record in records.values() if record["status"] == "certified"]
+    certified = [count(record["hand"]) for record in records.values() if record["status"] == "certified"]
     if certified:
         ones = sum(motors == 1 for motors in certified)
         words = f"{len(certified)} of {len(rows)} certified, median {median(certified):g} motors"
@@ -72,7 +72,7 @@ def row(record: dict[str, Any], other: dict[str, Any] | None) -> list[str]:
         record["task"],
         record["status"],
         joints(record),
-        str(hand.get("motors", NONE)),
+        str(count(hand)) if hand else NONE,
         mean(record),
         goals,
         dropped,
@@ -80,6 +80,11 @@ def row(record: dict[str, Any], other: dict[str, Any] | None) -> list[str]:
         mean(other) if other else NONE,
         f"{record['seconds']['total']:.0f}",
     ]
+
+
+def count(hand: dict[str, Any]) -> int:
+    """Motors of a hand; one for every joint where its folder, of an earlier version, does not say."""
+    return int(hand.get("motors", sum(len(finger["links"]) for finger in hand["fingers"])))
 
 
 def joints(record: dict[str, Any]) -> str:

@@ -39,4 +39,10 @@ def test_certified_hands_are_counted(
     monkeypatch.setattr("sys.argv", ["motors.py", *folders, "--out", str(tmp_path / "table.md")])
     motors.main()
     assert "2 of 3 certified, median 2 motors, 1 with one, at most 3" in capsys.readouterr().out
+    earlier = record((2, 2), 0, 0)
+    del earlier["hand"]["motors"]
+    assert motors.row(earlier, None)[3] == "4"
+    (tmp_path / "b" / "result.json").write_text(json.dumps(earlier))
+    motors.main()
+    assert "2 of 3 certified, median 2.5 motors, 1 with one, at most 4" in capsys.readouterr().out
     assert (tmp_path / "table.md").read_text().count("a turn") == 3
