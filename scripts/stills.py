@@ -23,6 +23,7 @@ MOMENTS = 5
 SIZE = (528, 396)
 """Width and height, pixels."""
 _JOINT = 1.12  # radius of a joint's ball over its link's: so that joints can be counted
+_TONGUE = 0.6  # radius of what reaches from a link's body to its joint, over its link's
 _DOT = 0.07  # radius of a goal point over the object's characteristic length
 _ARROW = 1.3  # length of the longest force arrow over the object's characteristic length
 
@@ -90,15 +91,25 @@ def _bodies(design: Design, timeline: Timeline, sample: int) -> list[Capsule | D
     """The palm, the fingers and the object at one sample, in the world."""
     palm, hand = timeline.palm[sample], design.hand or _bare_palm(design)
     bodies: list[Capsule | Disc] = [Disc(palm, hand.palm_radius, hand.palm_thickness, PALM_COLOR)]
+    for ball in hand.palm_balls:
+        at = _placed(palm, ball.start)
+        bodies.append(Capsule(at, at, ball.radius, PALM_COLOR))
     for i, finger in enumerate(hand.fingers):
         for j, link in enumerate(finger.links):
             pose = palm @ timeline.links[f"finger{i}_link{j}"][sample]
-            tip = pose[:3, 3] + link.length * pose[:3, 2]
-            is_tip = j == len(finger.links) - 1
-            bodies.append(Capsule(pose[:3, 3], tip, link.radius, finger_color(i), joint_color(i) if is_tip else None))
+            solid, last = link.solid, joint_color(i) if j == len(finger.links) - 1 else None
+            start, end = _placed(pose, solid.start), _placed(pose, solid.end)
+            bodies.append(Capsule(start, end, solid.radius, finger_color(i), last))
+            if link.hinge:
+                bodies.append(Capsule(pose[:3, 3], start, _TONGUE * link.radius, joint_color(i), shades=False))
             bodies.append(Capsule(pose[:3, 3], pose[:3, 3], _JOINT * link.radius, joint_color(i), shades=False))
     bodies.extend(_object_at(design, timeline.object[sample], OBJECT_COLOR, checked=True))
     return bodies
+
+
+def _placed(pose: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """A point (3,) of a frame, where the frame's pose (4, 4) has it."""
+    return np.asarray(pose[:3, :3] @ point + pose[:3, 3])
 
 
 def _object_at(design: Design, pose: np.ndarray, color: Color, checked: bool) -> list[Capsule | Disc]:
@@ -106,7 +117,7 @@ def _object_at(design: Design, pose: np.ndarray, color: Color, checked: bool) ->
     checks = pose if checked else None
     bodies: list[Capsule | Disc] = []
     for solid in (solid for shape in design.task.object.shapes for solid in shape.body.solids()):
-        start, end = (pose[:3, :3] @ each + pose[:3, 3] for each in (solid.start, solid.end))
+        start, end = _placed(pose, solid.start), _placed(pose, solid.end)
         if solid.kind == "cylinder":
             bodies.append(_disc(start, end, solid.radius, color))
         else:
