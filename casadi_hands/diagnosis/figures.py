@@ -113,6 +113,8 @@ _ADVICE = {
     "joint_limit": "wider hand.joint_limits or more joints (search.max_joints)",
     "speed": "faster motors (actuator.speed) or slower goals",
     "torque": "stronger motors (actuator.torque) or a lighter object",
+    "coupling": "more motors (motors), wider ratios (hand.ratios), or limits.coupling as wide as you can accept",
+    "motors": "more motors (motors), wider ratios (hand.ratios) or another seed (--seed)",
     "unsupplied_force": "more joints (search.max_joints)",
     "disturbance_radius": "more fingers, or contacts farther apart",
     "least_stiffness": "stiffer motors (actuator.stiffness), thicker links (hand.link_radius), or more fingers",

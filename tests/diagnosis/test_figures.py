@@ -110,7 +110,7 @@ def test_missed_figures_are_told_with_limit_advice_and_the_motors_own_units() ->
 def test_every_figure_of_the_audit_has_its_own_advice() -> None:
     from casadi_hands.task.limits import Limits
 
-    assert set(words._ADVICE) == {*Limits.model_fields, "structure", "rest", "residual_disturbed"}
+    assert set(words._ADVICE) == {*Limits.model_fields, "structure", "rest", "residual_disturbed", "motors"}
 
 
 @pytest.mark.parametrize("friction", [0.04, 0.08])
