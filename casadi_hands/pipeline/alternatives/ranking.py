@@ -15,6 +15,8 @@ MOST = 4
 
 _ACCURACY = frozenset(("structure", "goal_position", "goal_angle", "residual", "residual_between", "gap"))
 """Figures of how accurately a motion was planned; the refinement uses up tolerances that cost it something."""
+_NO_SHARE = _ACCURACY | {"motors"}
+"""Figures of which nothing need be left: as many motors as are asked for are no risk."""
 
 _STATUS = ("certified", "feasible", "failed")
 
@@ -80,10 +82,10 @@ def rank(designs: Mapping[int, Design]) -> list[Alternative]:
 def margin(design: Design) -> float:
     """The smallest share that is left of any limit of the certificate, and of the friction.
 
-    1 is all of it, 0 none, and a limit that is missed counts as negative. Two kinds of figures count only when they
-    are missed: those with a limit of 0, which leaves no share, and those of accuracy (goals, residuals, gap at the
-    samples), which say nothing of how robust the hand is. Minus infinity without a certificate, or where a figure is
-    not a number.
+    1 is all of it, 0 none, and a limit that is missed counts as negative. Three kinds of figures count only when they
+    are missed: those with a limit of 0, which leaves no share, those of accuracy (goals, residuals, gap at the
+    samples), which say nothing of how robust the hand is, and the number of motors. Minus infinity without a
+    certificate, or where a figure is not a number.
     """
     shares = [_share_left(name, figure) for name, figure in design.certificate.items()]
     return min((share for share in shares if share is not None), default=-math.inf)
@@ -108,7 +110,7 @@ def _share_left(name: str, figure: Mapping[str, Any]) -> float | None:
         return None
     if value is None:
         return -math.inf
-    if figure["holds"] and (limit == 0.0 or name in _ACCURACY):
+    if figure["holds"] and (limit == 0.0 or name in _NO_SHARE):
         return None
     if limit == 0.0:
         return -math.inf

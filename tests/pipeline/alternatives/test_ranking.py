@@ -81,6 +81,8 @@ def test_margin_is_the_smallest_share_left() -> None:
     assert of(disturbance_radius=figure(0.4, 1.0, False)) == pytest.approx(-0.6)
     assert of(goal_position=figure(0.0004, 0.0005)) == pytest.approx(0.6)
     assert of(goal_position=figure(0.001, 0.0005, False)) == pytest.approx(-1.0)
+    assert of(motors=figure(2.0, 2.0)) == pytest.approx(0.6)
+    assert of(motors=figure(6.0, 2.0, False)) == pytest.approx(-2.0)
     assert of(pull=figure(0.1, 0.0, False)) == -math.inf
     assert of(gap_between=figure(None, 0.1, False)) == -math.inf
     assert margin(replace(example_design(), certificate={})) == -math.inf
