@@ -4,6 +4,7 @@ import csv
 import io
 from dataclasses import fields, replace
 
+import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -11,10 +12,13 @@ import pytest
 from casadi_hands.errors import DesignError, HandsError
 from casadi_hands.export.arrays import save_motion
 from casadi_hands.export.design import Design
+from casadi_hands.export.mjcf import scene_mjcf
 from casadi_hands.export.table import motion_table
 from casadi_hands.export.targets import TARGETS, export_design
+from casadi_hands.export.targets.source import Source
 from casadi_hands.problem.motion import Motion
 from tests.export.example import example_design, example_motion
+from tests.export.test_shared_motors import shared, shared_motion
 
 
 @pytest.fixture(scope="module")
@@ -28,6 +32,19 @@ def folder(tmp_path_factory):
 def contents(path):
     files = [path] if path.is_file() else sorted(item for item in path.rglob("*") if item.is_file())
     return {str(file.relative_to(path.parent)): file.read_bytes() for file in files}
+
+
+def test_drives_of_joints_that_share_motors_press_as_planned(tmp_path):
+    """Each with a damper of its own, as MuJoCo's position actuators have, by whose gains torques are computed."""
+    replace(example_design(), hand=shared(), motion=shared_motion()).save(tmp_path)
+    source = Source.read(tmp_path)
+    scene = scene_mjcf(source.task, replace(source.hand, drive=None), replace(source.motion, motor_positions=None))
+    model = mujoco.MjModel.from_xml_string(scene)
+    stiffness, damping = model.actuator_gainprm[:, 0], -model.actuator_biasprm[:, 2]
+    assert np.abs(damping * source.velocities).max() > 1e-3
+    exerted = stiffness * (source.commands - source.motion.joint_angles) - damping * source.velocities
+    np.testing.assert_allclose(exerted, source.motion.joint_torques, atol=1e-9)
+    np.testing.assert_array_equal(source.motion.joint_commands, shared_motion().joint_commands)
 
 
 def test_a_table_holds_every_number_of_the_motion_exactly(folder):

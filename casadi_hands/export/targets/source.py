@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from casadi_hands.errors import DesignError, HandsError
+from casadi_hands.export.commands import commanded
 from casadi_hands.export.design import Design
 from casadi_hands.export.urdf import hand_urdf
 from casadi_hands.problem.hand import Hand
@@ -26,7 +27,7 @@ class Source:
         hand: designed for it.
         motion: of that hand.
         velocities: (S, J) of the joints, rad/s.
-        commands: (S, J) set points of the joints, rad.
+        commands: (S, J) set points of the joints, rad, each with a drive of its own, also where motors share them.
     """
 
     task: Task
@@ -54,11 +55,13 @@ class Source:
                     f"{directory}: motion.npz has no {name}; it was made by an earlier version; "
                     f"`casadi-hands solve {directory / 'task.yaml'} --from {directory}` makes it anew"
                 )
-        assert design.motion.joint_velocities is not None
-        assert design.motion.joint_commands is not None
-        return cls(
-            design.task, design.hand, design.motion, design.motion.joint_velocities, design.motion.joint_commands
-        )
+        commands, velocities = design.motion.joint_commands, design.motion.joint_velocities
+        if design.hand.drive is not None:
+            # Damped where it stands, unlike a spring's damper, a joint's own drive must be told to make up for that.
+            commands = commanded(design.task, replace(design.hand, drive=None), design.motion).joint_commands
+        assert velocities is not None
+        assert commands is not None
+        return cls(design.task, design.hand, design.motion, velocities, commands)
 
     def welded_urdf(self) -> str:
         """The hand as URDF text, its palm fixed to the link ``world`` where it is when the motion starts."""
