@@ -35,7 +35,7 @@ def hand_urdf(hand: Hand, world: tuple[Sequence[float], Sequence[float]] | None 
     """The hand as URDF text.
 
     Link ``palm`` is the palm frame; ``finger{i}_link{j}`` has its origin at its joint and z along the segment. At
-    zero angles all frames are parallel.
+    zero angles it is turned from the frame of its parent by the link's bend.
 
     Args:
         hand: the designed hand.

@@ -135,7 +135,8 @@ class Record:
 
         Args:
             design: with its certificate; what misses fewer limits of the audit is better, of equals what misses fewer
-                in replays (all, where they were not run), then what is dropped less.
+                in replays (all, where they were not run), then what has fewer motors where joints share them, then
+                what is dropped less. With more motors than asked for it is kept as feasible: fewer are looked for.
 
         Returns:
             the best design so far.
