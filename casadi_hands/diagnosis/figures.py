@@ -109,7 +109,6 @@ _ADVICE = {
     "gap_between": "a smaller time_step or more joints (search.max_joints)",
     "slip": "more joints (search.max_joints), or limits.slip as wide as you can accept",
     "penetration": "thinner links (hand.link_radius), a palm farther away or contacts farther apart",
-    "coupling": "more motors (motors)",
     "joint_limit": "wider hand.joint_limits or more joints (search.max_joints)",
     "speed": "faster motors (actuator.speed) or slower goals",
     "torque": "stronger motors (actuator.torque) or a lighter object",
