@@ -262,14 +262,7 @@ def _add_solid(body: Element, attributes: dict[str, str], solid: Solid, color: C
 
 
 def _add_actuators(root: Element, joints: Sequence[str], motors: tuple[Motor, ...], effort: float) -> None:
-    """Add a position actuator for every joint, named as it.
-
-    Args:
-        root: of the scene.
-        joints: names of the hand's joints or, where these share motors, of the motors' own.
-        motors: of each.
-        effort: its torque limit, N·m.
-    """
+    """Add a position actuator for every joint or, where these share motors, every motor, named as what it turns."""
     actuators = SubElement(root, "actuator")
     for name, motor in zip(joints, motors, strict=True):
         SubElement(
