@@ -81,10 +81,12 @@ def open_page(directory: Path) -> Path:
 
 
 def _summary(design: Result, scene: Scene) -> str:
-    """One line: how it ended, how many joints, what an arrow's length means, what replays said."""
+    """One line: how it ended, how many joints and shared motors, what an arrow's length means, what replays said."""
     parts = [design.status]
     if design.hand is not None:
-        parts.append(f"{len(design.hand.fingers)} fingers, {design.hand.degrees_of_freedom} joints")
+        joints, motors = design.hand.degrees_of_freedom, design.hand.motors
+        shared = "" if design.hand.drive is None else f" on {motors} motor{'' if motors == 1 else 's'}"
+        parts.append(f"{len(design.hand.fingers)} fingers, {joints} joints{shared}")
     if scene.longest_force > 0:
         parts.append(f"longest force arrow {scene.longest_force:.3g} N")
     if design.replays:
