@@ -189,11 +189,11 @@ def test_a_contact_out_of_reach_fails_the_task(
 
 
 def test_motors_too_weak_are_named_with_what_they_must_give(tmp_path: Path) -> None:
-    design = solve(parse_task(changed("actuator: {torque: 0.0005, speed: 5}")), jobs=1, out=tmp_path)
+    design = solve(parse_task(changed("actuator: {torque: 0.002, speed: 5}")), jobs=1, out=tmp_path)
     told = told_of(
         design,
         r"joint finger([01])_joint([01]) of finger '(left|right)' needs ([\d.]+) N·m at .* however .*, and the motors "
-        r"give 0\.0005 N·m; try stronger motors \(actuator\.torque\)",
+        r"give 0\.002 N·m; try stronger motors \(actuator\.torque\)",
     )
     assert ["left", "right"][int(told[1])] == told[3]
     # Each finger bears half the weight by friction of 0.5 at least, 8 cm up from its joint: most of 0.1 N·m at worst.
