@@ -72,8 +72,13 @@ class Declare(Protocol):
         """Declare a symbol (size,)."""
 
 
+def morphology_sizes(joints: int) -> dict[str, int]:
+    """How many numbers each part of a finger's morphology has, in the order in which kernels declare them."""
+    return {"base": 2, "lengths": joints, "axes": 2 * joints, "bends": 2 * joints}
+
+
 def morphology(declare: Declare, frames: SX, joints: int, place: int | None = None) -> FingerSymbols:
-    """Declare a finger's morphology (base 2, lengths n, axis coordinates 2n, bends 2n) with ``declare``.
+    """Declare a finger's morphology with ``declare``.
 
     Args:
         declare: a kernel's ``variable`` or ``parameter``.
@@ -82,11 +87,9 @@ def morphology(declare: Declare, frames: SX, joints: int, place: int | None = No
         place: which of several fingers of the kernel, appended to the names; None for the only one.
     """
     tag = "" if place is None else str(place)
-    base = declare(f"base{tag}", 2, "base", place)
-    lengths = declare(f"lengths{tag}", joints, "lengths", place)
-    coordinates = declare(f"axes{tag}", 2 * joints, "axes", place)
-    bends = declare(f"bends{tag}", 2 * joints, "bends", place)
-    return FingerSymbols(base, lengths, axes_of(coordinates, frames), turns_of(bends))
+    sizes = morphology_sizes(joints)
+    base, lengths, axes, bends = (declare(f"{name}{tag}", size, name, place) for name, size in sizes.items())
+    return FingerSymbols(base, lengths, axes_of(axes, frames), turns_of(bends))
 
 
 def axes_of(coordinates: SX, frames: SX) -> SX:
@@ -98,7 +101,7 @@ def axes_of(coordinates: SX, frames: SX) -> SX:
 
 def turns_of(bends: SX) -> SX:
     """The rotations (3, 3n), parent <- link, of bends (2n,)."""
-    return ca.horzcat(*[bent(bends[2 * j : 2 * j + 2]) for j in range(bends.numel() // 2)])
+    return ca.horzcat(*[bend_rotation(bends[2 * j : 2 * j + 2]) for j in range(bends.numel() // 2)])
 
 
 def axis(coordinates: SX, frame: SX) -> SX:
@@ -108,7 +111,7 @@ def axis(coordinates: SX, frame: SX) -> SX:
     return ca.mtimes(rotation, ca.vertcat(ca.sin(angle) / angle * coordinates, ca.cos(angle)))
 
 
-def bent(bend: SX) -> SX:
+def bend_rotation(bend: SX) -> SX:
     """The rotation (3, 3), parent <- link, by a rotation vector (2,) across the parent's z axis, rad."""
     x, y = bend[0], bend[1]
     angle = norm(bend, 1e-5)

@@ -19,6 +19,7 @@ from casadi_hands.problem.floating_motion import Floating
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.palm_motion import goals_seen_from_palm
 from casadi_hands.problem.resampling import shortened
+from casadi_hands.problem.structure import mobility
 from casadi_hands.stages.refine.result import Refined
 from casadi_hands.stages.synthesis.algorithm import Candidate, Found, Search
 
@@ -73,7 +74,8 @@ class Certifier:
                     return best
                 self.record.log("refine", f"not certified: {judged.reason}")
                 failing |= failing_fingers(self.model, refined)
-                if refined.barely_rolls and _mobility(candidate.joints) < MOBILE:
+                touching = np.ones((1, len(candidate.joints)), bool)
+                if refined.barely_rolls and mobility(candidate.joints, touching) < MOBILE:
                     break  # a structure that must slip will do so in any of its hands
                 rolling += not refined.barely_rolls
             least = self._more_joints(found, failing)
@@ -103,11 +105,6 @@ class Certifier:
             return None
         fewest = min(joints[c] for c in chosen)
         return {c: n + (c in chosen and n == fewest) for c, n in joints.items()}
-
-
-def _mobility(joints: tuple[int, ...]) -> int:
-    """How many ways object and joints can go at once while all fingers roll (Grübler)."""
-    return 6 + sum(n - 3 for n in joints)
 
 
 def refinable(record: Record, model: Model, floating: Floating) -> tuple[Model, Floating, float]:

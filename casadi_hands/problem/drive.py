@@ -43,10 +43,6 @@ class Drive:
         """(S, J) rad, of positions (S, N) of the motors."""
         return np.asarray(np.array(self.offsets) + positions @ np.array(self.ratios).T)
 
-    def torques(self, joint_torques: Array) -> Array:
-        """(S, N) N·m with which motors hold torques (S, J) of the joints, by virtual work."""
-        return np.asarray(joint_torques @ np.array(self.ratios))
-
     def leader(self, joint: int) -> tuple[int, float, float] | None:
         """The joint that another follows, with which multiplier and offset (rad), by their commands.
 

@@ -23,8 +23,8 @@ from casadi_hands.problem.palm_motion import poses_at
 from casadi_hands.problem.placement import (
     in_palm,
     in_world,
-    joint_torques,
     object_rotation,
+    torques_in_all,
 )
 from casadi_hands.problem.si import LEAST, RESERVE, motion_in_si
 from casadi_hands.task import Task
@@ -99,12 +99,9 @@ def drive_of(task: Task, model: Model, motion: WholeHand) -> Drive:
         model: for the units.
         motion: with a coupling.
     """
-    coupling, actuator, torques = motion.coupling, task.actuator, 0.0
+    coupling, actuator = motion.coupling, task.actuator
     assert coupling is not None
-    for forces in (motion.force, motion.disturbed):
-        if forces is not None:
-            joints = joint_torques(model, replace(motion, force=forces))
-            torques = max(torques, float(np.abs(joints @ coupling.ratios).max()))
+    torques = float(np.abs(torques_in_all(model, motion) @ coupling.ratios).max())
     speeds = np.diff(coupling.positions, axis=0) / np.diff(model.schedule.samples)[:, None]
     speed = float(np.abs(speeds).max())
     # From sample to sample motors go straight: where they change their speed, their rotors ask for torque, too.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
@@ -70,6 +72,12 @@ def joint_torques(model: Model, motion: WholeHand) -> Array:
             torque += np.einsum("sjab,jb,sa->sj", rotations, finger.axis_vectors, moment)
         found.append(torque)
     return np.hstack(found)
+
+
+def torques_in_all(model: Model, motion: WholeHand) -> Array:
+    """(K, S, J) joint torques of the motion as planned and, where the task disturbs it, under that; m·g·length."""
+    forces = [each for each in (motion.force, motion.disturbed) if each is not None]
+    return np.array([joint_torques(model, replace(motion, force=force)) for force in forces])
 
 
 def forces_of_joint_errors(model: Model, motion: WholeHand, finger: int, error: float) -> Array:

@@ -21,12 +21,7 @@ from casadi_hands.problem.loads import USUAL_FORCE, usual_force_limit
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.motion import Motion
 from casadi_hands.problem.palm_path import PalmPath
-from casadi_hands.problem.placement import (
-    contact_jacobians,
-    object_rotation,
-    turned_to_palm,
-    turned_to_world,
-)
+from casadi_hands.problem.placement import object_rotation, torques_in_all
 from casadi_hands.problem.scenario import Scenario, planned
 from casadi_hands.problem.units import STANDARD_GRAVITY, Units, round_off
 from casadi_hands.task import Task
@@ -278,14 +273,8 @@ def motion_in_si(
 
 
 def joint_loads(model: Model, result: WholeHand) -> tuple[float, float]:
-    """Largest joint torque (N·m, from contact forces, disturbed ones too) and speed (rad/s) of a motion."""
-    torque, speed = 0.0, 0.0
+    """Largest joint torque (N·m, from forces and moments of contacts, disturbed ones too) and speed (rad/s)."""
     steps = np.diff(model.schedule.samples)[:, None]
-    for i, contact in enumerate(result.contacts):
-        speed = max(speed, float(np.abs(np.diff(result.angles[i], axis=0) / steps).max()))
-        jacobians = contact_jacobians(model, result, i)
-        for forces in (result.force, result.disturbed):
-            if forces is not None:
-                force = turned_to_palm(result, turned_to_world(model, result, forces[:, contact]))
-                torque = max(torque, float(np.abs(np.einsum("sij,si->sj", jacobians, force)).max()))
+    speed = max((float(np.abs(np.diff(angles, axis=0) / steps).max()) for angles in result.angles), default=0.0)
+    torque = float(np.abs(torques_in_all(model, result)).max()) if result.fingers else 0.0
     return torque * model.units.torque, speed

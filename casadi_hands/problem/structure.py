@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -40,6 +41,16 @@ class Inner:
         rows, knots, share = np.arange(len(chosen)), self.interval[chosen], self.share[chosen]
         weights[rows, knots], weights[rows, knots + 1] = 1 - share, share
         return weights
+
+
+def mobility(joints: Sequence[int], touching: NDArray[np.bool_]) -> int:
+    """How many ways object and joints can go at once while all fingers that touch roll, where fewest (Grübler).
+
+    Args:
+        joints: of each finger.
+        touching: (S, F) which fingers do.
+    """
+    return int(6 + (touching @ (np.array(joints, int) - 3)).min())
 
 
 @dataclass(frozen=True)

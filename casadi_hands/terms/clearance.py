@@ -74,6 +74,12 @@ def links_and_links(ends: list[tuple[SX, SX]], others: list[tuple[SX, SX]], radi
     return ca.vertcat(*[segment_distance(*a, *b) - 2 * radius for a in ends for b in others])
 
 
+def two_fingers(ends: list[tuple[SX, SX]], others: list[tuple[SX, SX]], radius: SX, servo: SX | None = None) -> SX:
+    """Distances between two fingers: of their links and, where joints hold servos in balls of a radius, of those."""
+    links = links_and_links(ends, others, radius)
+    return links if servo is None else ca.vertcat(links, servos_and_finger(ends, others, radius, servo))
+
+
 def links_of_one(ends: list[tuple[SX, SX]], radius: SX) -> SX:
     """Distances between links of one finger that are not neighbours."""
     pairs = [(ends[i], ends[j]) for i in range(len(ends)) for j in range(i + 2, len(ends))]

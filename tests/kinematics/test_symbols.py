@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.kinematics.numeric import contact_kinematics
-from casadi_hands.kinematics.symbols import axes_of, axis, bent, cosines_from_links, tip_point, turns_of
+from casadi_hands.kinematics.symbols import axes_of, axis, bend_rotation, cosines_from_links, tip_point, turns_of
 from tests.stages.example import PinFinger, everything, made_up_finger, project
 
 LENGTH, RADIUS = 0.7, 0.2
@@ -43,7 +43,7 @@ def test_axis_is_unit_and_leans_towards_its_coordinates() -> None:
 
 @pytest.mark.parametrize("bend", [[0, 0], [1e-7, 0], [0.3, -0.2], [0, np.pi / 2], [-1.5, 1.4]])
 def test_bent_is_the_rotation_of_its_vector(bend: list[float]) -> None:
-    found = np.asarray(ca.evalf(bent(ca.SX(ca.DM(bend)))))
+    found = np.asarray(ca.evalf(bend_rotation(ca.SX(ca.DM(bend)))))
     # The angle is rounded off at zero, by 1e-5 rad.
     np.testing.assert_allclose(found, pin.exp3(np.array([*bend, 0.0])), atol=1e-9)
     np.testing.assert_allclose(found.T @ found, np.eye(3), atol=2e-9)
@@ -80,7 +80,7 @@ def test_cosines_are_those_of_axes_and_links_that_pinocchio_has(joints: int) -> 
 
 def test_derivatives_of_a_bend_are_finite_where_the_link_is_straight() -> None:
     x = ca.SX.sym("x", 2)
-    jacobian = ca.jacobian(ca.vec(bent(x)), x)
+    jacobian = ca.jacobian(ca.vec(bend_rotation(x)), x)
     first, second = (np.asarray(v) for v in ca.Function("f", [x], [jacobian, ca.jacobian(ca.vec(jacobian), x)])([0, 0]))
     assert np.isfinite(second).all()
     for k, generator in enumerate(np.eye(3)[:2]):

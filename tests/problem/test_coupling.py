@@ -58,13 +58,15 @@ def test_fewer_samples_than_motors_are_met(samples: int, rng: np.random.Generato
 
 
 def test_motors_do_the_work_of_joints(rng: np.random.Generator) -> None:
-    """Power: what motors exert, times how fast they turn, is what the springs exert, times how fast commands go."""
+    """Power: what motors exert, by virtual work, times how fast they turn is what springs do at commands' rates."""
     ratios = np.array([[1.0, 0.0], [0.0, 1.0], [-0.5, 0.0], [0.7, -1.3]])
     drive = Drive(tuple(map(tuple, ratios.tolist())), (0.1, 0.2, 0.3, 0.4), 1.0, 1.0)
     positions, torques = rng.normal(size=(5, 2)), rng.normal(size=(5, 4))
     rates = np.diff(drive.commands(positions), axis=0)
     expected = np.sum(torques[1:] * rates, axis=1)
-    np.testing.assert_allclose(np.sum(drive.torques(torques)[1:] * np.diff(positions, axis=0), axis=1), expected)
+    np.testing.assert_allclose(
+        np.sum((torques @ np.array(drive.ratios))[1:] * np.diff(positions, axis=0), axis=1), expected
+    )
 
 
 def test_a_joint_of_one_motor_follows_the_first_that_it_turns_alone() -> None:

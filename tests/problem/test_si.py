@@ -68,10 +68,13 @@ def free_task(text: str) -> Task:
     return parse_task("\n".join(line for line in text.splitlines() if not line.startswith("actuator")))
 
 
-def test_loads_are_those_of_numeric_pinocchio_of_disturbed_forces_too(made_up: MadeUp) -> None:
+def test_loads_are_those_of_numeric_pinocchio_of_disturbed_forces_and_of_torsion_too(made_up: MadeUp) -> None:
     hand, _ = written(made_up)
     model = made_up.model
     assert hand.disturbed is not None
+    assert hand.torsion is not None
+    assert np.abs(hand.torsion).max() > 0.01
+    torsion = hand.torsion
     reference = Rotation.from_quat(model.reference, scalar_first=True)
     palms = Rotation.from_quat(hand.palm_quaternion, scalar_first=True)
     largest = {"force": 0.0, "disturbed": 0.0}
@@ -82,8 +85,13 @@ def test_loads_are_those_of_numeric_pinocchio_of_disturbed_forces_too(made_up: M
             point = palms[s].inv().apply(hand.position[s] - hand.palm_position[s]) + turn.apply(hand.point[s, contact])
             chain, link = numeric.chain(row)
             jacobian = numeric.jacobian(row, link.T @ (point - chain[-2]))
+            normal = model.touched[contact].outward(hand.point[s, contact])
+            moment = turn.apply(model.torsion * torsion[s, contact] * normal)
+            steps = 1e-5 * np.eye(len(row))
+            turned = [numeric.chain(row + step)[1] @ numeric.chain(row - step)[1].T for step in steps]
+            twisted = np.array([Rotation.from_matrix(each).as_rotvec() / 2e-5 for each in turned]) @ moment
             for name in largest:
-                torque = np.abs(jacobian.T @ turn.apply(getattr(hand, name)[s, contact])).max()
+                torque = np.abs(jacobian.T @ turn.apply(getattr(hand, name)[s, contact]) + twisted).max()
                 largest[name] = max(largest[name], float(torque))
     torque, speed = joint_loads(model, hand)
     assert torque == pytest.approx(max(largest.values()) * model.units.torque, rel=1e-6)

@@ -20,6 +20,7 @@ from casadi_hands.problem.commands import coupled
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.resampling import at_rest, extrapolated, on_palm, resampled, resampled_model
+from casadi_hands.problem.structure import mobility
 from casadi_hands.stages.refine.result import Refined, Run
 from casadi_hands.stages.refine.settings import (
     ALL_STEPS,
@@ -35,7 +36,7 @@ from casadi_hands.stages.refine.values import Margin
 
 SPARSE, COARSE = 0.4, 0.2  # s between knots, at most
 NEARLY_EXACT = 0.1  # cost of slip and of forces that no joint actuates, of a start that is nearly exact
-OFF_LINES = 0.01  # of any constraint: a coupled motion that misses more on sparse knots does on more of them, too
+FAR_OFF_LINES = 0.01  # of any constraint: a coupled motion that misses more on sparse knots does on more of them, too
 LEAST_STEP = 0.05  # of the homotopy parameter
 LEAST = 0.1  # homotopy parameter for which a first exact motion is looked for
 
@@ -180,20 +181,15 @@ class Continuation:
         """
         stage, found = self.sparse, self._named(self.sparse, find(self.sparse))
         surely_slips = found.slips_hopelessly and found.worst.violation <= STIFF_PENALTY.constr_viol_tol
-        off_lines = bool(self.model.motors) and found.worst.violation > OFF_LINES
-        if found.exact or surely_slips or off_lines or self.coarse is self.sparse or self._mobility < 2:
+        off_lines = bool(self.model.motors) and found.worst.violation > FAR_OFF_LINES
+        ways = mobility(self.joints, self.active[:, list(self.contacts)])
+        if found.exact or surely_slips or off_lines or self.coarse is self.sparse or ways < 2:
             return stage, found
         again = self._named(self.coarse, find(self.coarse))
         runs = found.runs + again.runs
         if again.misses_less_than(found):
             stage, found = self.coarse, again
         return stage, replace(found, runs=runs)
-
-    @property
-    def _mobility(self) -> int:
-        """How many ways object and joints can go at once while all fingers that touch roll, where fewest (Grübler)."""
-        touching = self.active[:, list(self.contacts)]
-        return int(6 + (touching @ (np.array(self.joints, int) - 3)).min())
 
     def _continued(self, start: WholeHand, homotopy: float, margin: Margin, stage: RefineStage) -> Refined:
         """The longest motion found on the knots of a stage."""

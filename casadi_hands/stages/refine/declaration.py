@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from casadi_hands.geometry.bodies import width_of
 from casadi_hands.kinematics.singularity import MARGIN_SIZES
+from casadi_hands.kinematics.symbols import morphology_sizes
 from casadi_hands.nlp import Kernel, Parameter, Problem, Rows
 from casadi_hands.nlp.arguments import Argument
 from casadi_hands.problem.model import Model
@@ -140,9 +141,9 @@ class Declaration:
             self._own("tie", c, (1, 1))
             if n in MARGIN_SIZES:
                 self._own("margin_direction", c, (count, MARGIN_SIZES[n]))
-            wanted = {"wanted_base": 2, "wanted_lengths": n, "wanted_axes": 2 * n, "wanted_bends": 2 * n}
-            for name, width in ({"frames": 9 * n} | wanted).items():
-                self._own(name, c, (1, width))
+            self._own("frames", c, (1, 9 * n))
+            for name, width in morphology_sizes(n).items():
+                self._own(f"wanted_{name}", c, (1, width))
 
     def _own(self, name: str, contact: int, shape: tuple[int, int]) -> None:
         """Declare a parameter of one contact."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from casadi_hands.kinematics.singularity import MARGIN_SIZES
 from casadi_hands.nlp import Parameter, Rows
+from casadi_hands.problem.model import Model
 from casadi_hands.stages.buildable import buildable, buildable_bounds
 from casadi_hands.stages.refine import finger_kernels as kernels
 from casadi_hands.stages.refine.declaration import FREE, IN_CONE, Bounds, Declaration, Knots
@@ -114,6 +115,11 @@ def _shape(of: Declaration, i: int, knots: Knots) -> dict[str, Rows]:
     return {name: rows.constant(len(knots)) for name, rows in of.shape[i].items()}
 
 
+def _radii(model: Model) -> tuple[str, ...]:
+    """Parameters of what is kept clear: links, and servos in the joints if there are any."""
+    return ("radius", "servo_radius") if model.servo else ("radius",)
+
+
 def bind_clearance(of: Declaration, i: int) -> None:
     """A finger clear of palm, ground, itself and the object, but for what its last link touches."""
     structure, model = of.structure, of.structure.model
@@ -126,14 +132,14 @@ def bind_clearance(of: Declaration, i: int) -> None:
     ) -> None:
         of.bind(
             knots,
-            kernels.apart(n, model.kinds, skipped, model.ground is not None),
+            kernels.apart(n, model.kinds, skipped, model.ground is not None, bool(model.servo)),
             {"clear": (least, np.inf), "unfolded": (0.0, np.inf)},
             (c,),
             f"{kind}{c}",
             **_shape(of, i, knots),
             **moving,
             **palm,
-            **of.at(knots, "reference", "radius", "palm_radius", "ground_height", "bodies"),
+            **of.at(knots, "reference", "palm_radius", "ground_height", "bodies", *_radii(model)),
             **of.of(c, knots, "frames"),
         )
 
@@ -180,14 +186,14 @@ def bind_pair(of: Declaration, i: int, j: int, guarded: bool) -> None:
         shapes = _shape(of, i, knots), _shape(of, j, knots)
         of.bind(
             knots,
-            kernels.fingers_apart(structure.joints[i], structure.joints[j]),
+            kernels.fingers_apart(structure.joints[i], structure.joints[j], bool(structure.model.servo)),
             {"clear": (least, np.inf)},
             (c, d),
             f"{kind}{c}_{d}",
             **{name: (shapes[0][name], shapes[1][name]) for name in shapes[0]},
             angles=angles,
             frames=(of.problem[f"frames{c}"], of.problem[f"frames{d}"]),
-            radius=of.problem["radius"],
+            **of.problem.given(*_radii(structure.model)),
         )
 
     bind("fingers_apart", np.arange(of.knots), [of.angles[k] for k in (i, j)], structure.model.clearance)

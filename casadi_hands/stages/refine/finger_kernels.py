@@ -13,7 +13,7 @@ from casadi_hands.geometry.bodies import Body, Surface, surfaces, width_of
 from casadi_hands.geometry.bodies.capsule import Segment
 from casadi_hands.geometry.surface import path_between, tangents
 from casadi_hands.kinematics.singularity import MARGIN_SIZES, singularity_margin
-from casadi_hands.kinematics.symbols import FingerSymbols, PlacedFinger, morphology
+from casadi_hands.kinematics.symbols import FingerSymbols, PlacedFinger, morphology, morphology_sizes
 from casadi_hands.motion import conjugate, derivative, rotation_matrix
 from casadi_hands.motion.pose import placed
 from casadi_hands.nlp import Kernel
@@ -212,7 +212,9 @@ def rolling(joints: int, kind: type[Body], soft: bool = False, slides: bool = Fa
 
 
 @cache
-def apart(joints: int, kinds: tuple[type[Body], ...], touched: int | None, grounded: bool) -> Kernel:
+def apart(
+    joints: int, kinds: tuple[type[Body], ...], touched: int | None, grounded: bool, servos: bool = False
+) -> Kernel:
     """One finger clear of palm, ground, itself and the object at one time.
 
     Args:
@@ -220,6 +222,7 @@ def apart(joints: int, kinds: tuple[type[Body], ...], touched: int | None, groun
         kinds: of the object's bodies.
         touched: index of the body that the last link touches, left out; None where it must stay clear of all.
         grounded: whether there is a ground.
+        servos: whether there is one in every joint, clear of all that it is not in.
     """
     kernel = Kernel("apart")
     symbols = free_morphology(kernel, joints)
@@ -227,11 +230,7 @@ def apart(joints: int, kinds: tuple[type[Body], ...], touched: int | None, groun
     reference, palm_position, palm_quaternion = (
         kernel.parameter(n, k) for n, k in (("reference", 4), ("palm_position", 3), ("palm_quaternion", 4))
     )
-    radius, palm_radius, ground = (
-        kernel.parameter("radius"),
-        kernel.parameter("palm_radius"),
-        kernel.parameter("ground_height"),
-    )
+    radius, palm_radius, ground = (kernel.parameter(name) for name in ("radius", "palm_radius", "ground_height"))
     bodies = surfaces(kinds, kernel.parameter("bodies", width_of(kinds)))
     position, quaternion = placed(pose, reference)
     to_palm = rotation_matrix(conjugate(palm_quaternion))
@@ -239,7 +238,8 @@ def apart(joints: int, kinds: tuple[type[Body], ...], touched: int | None, groun
     seen = [body.mapped(lambda point: ca.mtimes(rotation, point) + center) for body in bodies]
     here = symbols.placed(angles, radius)
     up = to_palm[:, 2] if grounded else None
-    clear, last = distances(here, radius, palm_radius, seen, up, ground - palm_position[2])
+    servo = kernel.parameter("servo_radius") if servos else None
+    clear, last = distances(here, radius, palm_radius, seen, up, ground - palm_position[2], servo)
     others = [last[k] for k in range(len(kinds)) if k != touched]
     kernel.constrain(limits.CLEAR, ca.vertcat(clear, *others))
     if joints > 1:
@@ -248,18 +248,17 @@ def apart(joints: int, kinds: tuple[type[Body], ...], touched: int | None, groun
 
 
 @cache
-def fingers_apart(joints: int, other_joints: int) -> Kernel:
-    """Two fingers clear of each other at one time."""
+def fingers_apart(joints: int, other_joints: int, servos: bool = False) -> Kernel:
+    """Two fingers, and servos in their joints if they have any, clear of each other at one time."""
     kernel = Kernel("fingers_apart")
     first = free_morphology(kernel, joints, 0)
     angles = kernel.variable("angles0", joints, "angles", 0)
     second = free_morphology(kernel, other_joints, 1)
     other_angles = kernel.variable("angles1", other_joints, "angles", 1)
     radius = kernel.parameter("radius")
-    kernel.constrain(
-        limits.CLEAR_OF_EACH_OTHER,
-        clearance.links_and_links(first.placed(angles, radius).ends, second.placed(other_angles, radius).ends, radius),
-    )
+    servo = kernel.parameter("servo_radius") if servos else None
+    ends = first.placed(angles, radius).ends, second.placed(other_angles, radius).ends
+    kernel.constrain(limits.CLEAR_OF_EACH_OTHER, clearance.two_fingers(*ends, radius, servo))
     return kernel
 
 
@@ -291,7 +290,7 @@ def joint_jerk(joints: int) -> Kernel:
 def near_design(joints: int) -> Kernel:
     """A finger's morphology: short, on the palm, and near what the synthesis found."""
     kernel = Kernel("near_design")
-    sizes = {"base": 2, "lengths": joints, "axes": 2 * joints, "bends": 2 * joints}
+    sizes = morphology_sizes(joints)
     shape = {name: kernel.variable(name, size) for name, size in sizes.items()}
     off = [shape[name] - kernel.parameter(f"wanted_{name}", size) for name, size in sizes.items()]
     kernel.cost(finger.STAY_DESIGN, ca.vertcat(*off))

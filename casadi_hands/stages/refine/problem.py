@@ -11,7 +11,6 @@ from casadi_hands.stages.refine.declaration import Block, Declaration
 from casadi_hands.stages.refine.finger_binding import bind_clearance, bind_contact, bind_pair, bind_rolling, bind_shape
 from casadi_hands.stages.refine.object_binding import bind_ground, bind_object, bind_physics
 from casadi_hands.stages.refine.restoration import Proximity
-from casadi_hands.stages.refine.servo_kernels import bind as bind_servos
 from casadi_hands.stages.refine.sliding import bind as bind_sliding
 from casadi_hands.stages.refine.torsion import bind as bind_torsion
 
@@ -45,8 +44,6 @@ class RefineProblem(Declaration):
             bind_shape(self, i)
             for j in range(i):
                 bind_pair(self, i, j, guarded)
-        if structure.model.servo:
-            bind_servos(self)
         self._bind_own()
         self.proximity = Proximity(self.problem)
 

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from casadi_hands.geometry.bodies import Body, packed
 from casadi_hands.kinematics.singularity import LEAST_MARGIN, MARGIN_SIZES, margin_directions
+from casadi_hands.kinematics.symbols import morphology_sizes
 from casadi_hands.motion import continuous
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
@@ -172,8 +173,8 @@ class RefineValues:
             disturbed = balanced(points[k], forces[k], self._active[k], needed)
             values["force_disturbed"] = disturbed.reshape(len(k), -1)
         for c, finger, angles in zip(self.structure.contacts, motion.fingers, motion.angles, strict=True):
-            values |= {f"angles{c}": angles, f"base{c}": finger.base, f"lengths{c}": finger.lengths}
-            values |= {f"axes{c}": finger.axes.reshape(1, -1), f"bends{c}": finger.bends.reshape(1, -1)}
+            values[f"angles{c}"] = angles
+            values |= {f"{name}{c}": getattr(finger, name).reshape(1, -1) for name in morphology_sizes(finger.joints)}
         if motion.coupling is not None:
             values |= coupling_start(self.built, motion.coupling)
         return values
@@ -253,9 +254,8 @@ class RefineValues:
             if finger.joints in MARGIN_SIZES:
                 values[f"margin_direction{c}"] = 0.0
             values[f"frames{c}"] = finger.frames.transpose(0, 2, 1).reshape(1, -1)
-            values[f"wanted_base{c}"], values[f"wanted_lengths{c}"] = finger.base, finger.lengths
-            values[f"wanted_axes{c}"] = finger.axes.reshape(1, -1)
-            values[f"wanted_bends{c}"] = finger.bends.reshape(1, -1)
+            for name in morphology_sizes(finger.joints):
+                values[f"wanted_{name}{c}"] = getattr(finger, name).reshape(1, -1)
             values[f"tie{c}"] = SLIDING_TIE if model.slides(c) else LIFTING_TIE if model.lifts(c) else 1.0
             values[f"helper{c}"] = _helpers(motion.point[:, c], model.touched[c])
         return values

@@ -59,8 +59,8 @@ def build(joints: int) -> Kernel:
 
 
 @cache
-def collide(joints: int, kinds: tuple[type[Body], ...]) -> Kernel:
-    """One finger against object, palm, ground and itself at one time (eq. 2.20)."""
+def collide(joints: int, kinds: tuple[type[Body], ...], servos: bool = False) -> Kernel:
+    """One finger, and servos in its joints if it has any, against object, palm, ground and itself (eq. 2.20)."""
     kernel = Kernel("collide")
     frames = kernel.parameter("frames", 9 * joints)
     symbols = morphology(kernel.variable, frames, joints)
@@ -76,14 +76,17 @@ def collide(joints: int, kinds: tuple[type[Body], ...]) -> Kernel:
     ]
     if joints > 1:
         apart.append(clearance.links_and_object(ends[:-1], radius, bodies))
+    if servos:
+        servo = kernel.parameter("servo_radius")
+        apart.append(clearance.servos_and_rest(ends, radius, servo, palm_radius, bodies, up, ground))
     touching, folds = clearance.links_and_object(ends[-1:], radius, bodies), clearance.unfolded(ends, radius)
     kernel.cost(clearance.COLLISION, clearance.overlap(ca.vertcat(margin - ca.vertcat(*apart), -touching, -folds)))
     return kernel
 
 
 @cache
-def keep_apart(joints: int, other_joints: int) -> Kernel:
-    """Two fingers against each other at one time (eq. 2.20)."""
+def keep_apart(joints: int, other_joints: int, servos: bool = False) -> Kernel:
+    """Two fingers, and servos in their joints if they have any, against each other at one time (eq. 2.20)."""
     kernel = Kernel("keep_apart")
     frames = kernel.parameter("frames0", 9 * joints, "frames", 0)
     other_frames = kernel.parameter("frames1", 9 * other_joints, "frames", 1)
@@ -93,42 +96,8 @@ def keep_apart(joints: int, other_joints: int) -> Kernel:
     other_angles = kernel.variable("angles1", other_joints, "angles", 1)
     radius, margin = kernel.parameter("link_radius"), kernel.parameter("margin")
     ends = first.placed(angles, radius).ends, second.placed(other_angles, radius).ends
-    distances = clearance.links_and_links(*ends, radius)
-    kernel.cost(clearance.COLLISION, clearance.overlap(margin - distances))
-    return kernel
-
-
-@cache
-def keep_servos_clear(joints: int, kinds: tuple[type[Body], ...]) -> Kernel:
-    """One finger's servos against object, palm, ground and the rest of the finger at one time (eq. 2.20)."""
-    kernel = Kernel("keep_servos_clear")
-    frames = kernel.parameter("frames", 9 * joints)
-    symbols = morphology(kernel.variable, frames, joints)
-    angles = kernel.variable("angles", joints)
-    radius, servo, palm_radius, margin = (
-        kernel.parameter(name) for name in ("link_radius", "servo_radius", "palm_radius", "margin")
-    )
-    bodies = surfaces(kinds, kernel.parameter("bodies", width_of(kinds)))
-    up, ground = kernel.parameter("up", 3), kernel.parameter("ground")
-    ends = symbols.placed(angles, radius).ends
-    apart = clearance.servos_and_rest(ends, radius, servo, palm_radius, bodies, up, ground)
-    kernel.cost(clearance.COLLISION, clearance.overlap(margin - apart))
-    return kernel
-
-
-@cache
-def keep_servos_apart(joints: int, other_joints: int) -> Kernel:
-    """The servos of two fingers against each other and each other's links at one time (eq. 2.20)."""
-    kernel = Kernel("keep_servos_apart")
-    frames = kernel.parameter("frames0", 9 * joints, "frames", 0)
-    other_frames = kernel.parameter("frames1", 9 * other_joints, "frames", 1)
-    first = morphology(kernel.variable, frames, joints, 0)
-    angles = kernel.variable("angles0", joints, "angles", 0)
-    second = morphology(kernel.variable, other_frames, other_joints, 1)
-    other_angles = kernel.variable("angles1", other_joints, "angles", 1)
-    radius, servo, margin = (kernel.parameter(name) for name in ("link_radius", "servo_radius", "margin"))
-    ends = first.placed(angles, radius).ends, second.placed(other_angles, radius).ends
-    kernel.cost(clearance.COLLISION, clearance.overlap(margin - clearance.servos_and_finger(*ends, radius, servo)))
+    servo = kernel.parameter("servo_radius") if servos else None
+    kernel.cost(clearance.COLLISION, clearance.overlap(margin - clearance.two_fingers(*ends, radius, servo)))
     return kernel
 
 

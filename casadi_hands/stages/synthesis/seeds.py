@@ -29,7 +29,7 @@ def random_finger(target: Target, contact: int, joints: int, rng: np.random.Gene
     angles = rng.uniform(0.6 * low, 0.6 * high, joints)
     tip = target.tip_arc * rng.uniform(-0.7, 0.7, (target.strings(contact), 2))
     # No axis stands nearer than by half the bend to both links beside it.
-    most = min(target.bend, SEED_BEND, 2 * np.arccos(target.model.axis_cosines[0]))
+    most = min(target.model.bend, SEED_BEND, 2 * np.arccos(target.model.axis_cosines[0]))
     bends = _random_bends(joints, most, rng)
     links = [_links_beside(bend)[: 1 if j == 0 else 2] for j, bend in enumerate(bends)]
     return FingerSeed(

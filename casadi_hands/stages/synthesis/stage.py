@@ -11,16 +11,15 @@ from numpy.typing import NDArray
 
 from casadi_hands.geometry.bodies import width_of
 from casadi_hands.kinematics.morphology import FingerSeed
+from casadi_hands.kinematics.symbols import morphology_sizes
 from casadi_hands.motion import linear
-from casadi_hands.nlp import Kernel, Options, Parameter, Problem, Rows, Solution, Solver
+from casadi_hands.nlp import Options, Parameter, Problem, Rows, Solution, Solver
 from casadi_hands.stages.buildable import buildable, buildable_bounds
 from casadi_hands.stages.synthesis.kernels import (
     build,
     collide,
     follow,
     keep_apart,
-    keep_servos_apart,
-    keep_servos_clear,
     travel,
 )
 from casadi_hands.stages.synthesis.target import Target
@@ -31,7 +30,7 @@ OPTIONS = Options(max_iter=150, tol=1e-3, acceptable_tol=1e-2, mu_init=1e-3)
 BETWEEN = 2  # collision samples between neighbouring keyframes
 AXIS_RANGE = 2.2  # rad, how far an axis may turn from its seed
 MARGIN = 0.03  # clearance asked of bodies that need not touch, lengths
-MORPHOLOGY = ("base", "lengths", "axes", "bends")
+MORPHOLOGY = tuple(morphology_sizes(0))
 LOOSE = 0.4  # how far the box bounds of angles and lengths are opened while annealing
 
 
@@ -74,7 +73,7 @@ class SynthesisStage:
                 "base": ((1, 2), -reach, reach),
                 "lengths": ((1, n), shortest, longest),
                 "axes": ((1, 2 * n), -AXIS_RANGE, AXIS_RANGE),
-                "bends": ((1, 2 * n), -target.bend, target.bend),
+                "bends": ((1, 2 * n), -target.model.bend, target.model.bend),
                 "angles": ((count, n), *target.joint_limits),
                 "tips": ((target.strings(c), 2), -arc, arc),
             }
@@ -124,22 +123,18 @@ class SynthesisStage:
         )
         limits = problem.given("palm_radius", "link_radius", "shortest", "longest")
         problem.bind(build(n), base=rows["base"], lengths=rows["lengths"], bends=rows["bends"], **limits)
-        if target.model.hinged or target.bend:
-            kernel, bounds = buildable(n, target.model.hinged, bool(target.bend)), buildable_bounds(target.model)
+        if target.model.hinged or target.model.bend:
+            kernel, bounds = buildable(n, target.model.hinged, bool(target.model.bend)), buildable_bounds(target.model)
             problem.bind(kernel, bounds, f"buildable{c}", axes=rows["axes"], bends=rows["bends"], frames=frames)
         times = target.collision_times(BETWEEN)
-        around = ("link_radius", "palm_radius", "margin", "bodies", "up", "ground")
-        blocks: list[tuple[Kernel, tuple[str, ...]]] = [(collide(n, target.kinds), around)]
-        if target.model.servo:
-            blocks.append((keep_servos_clear(n, target.kinds), (*around, "servo_radius")))
-        for kernel, names in blocks:
-            problem.bind(
-                kernel,
-                **constant(len(times)),
-                angles=rows["angles"].combine(linear(target.times, times)),
-                frames=frames,
-                **problem.given(*names),
-            )
+        around = ("link_radius", "palm_radius", "margin", "bodies", "up", "ground", *self._servos)
+        problem.bind(
+            collide(n, target.kinds, bool(self._servos)),
+            **constant(len(times)),
+            angles=rows["angles"].combine(linear(target.times, times)),
+            frames=frames,
+            **problem.given(*around),
+        )
         idle = np.flatnonzero(~target.active[1:-1, c]) + 1
         if len(idle):
             three = [rows["angles"].take(idle + offset) for offset in (-1, 0, 1)]
@@ -151,18 +146,18 @@ class SynthesisStage:
         weights = linear(self.target.times, times)
         both = rows, others
         shapes = {name: [r[name].constant(len(times)) for r in both] for name in MORPHOLOGY}
-        joints, names = (self.joints[i], self.joints[j]), ("link_radius", "margin")
-        blocks: list[tuple[Kernel, tuple[str, ...]]] = [(keep_apart(*joints), names)]
-        if self.target.model.servo:
-            blocks.append((keep_servos_apart(*joints), (*names, "servo_radius")))
-        for kernel, given in blocks:
-            self.problem.bind(
-                kernel,
-                **shapes,
-                angles=[r["angles"].combine(weights) for r in both],
-                frames=[self.problem[f"frames{self.contacts[k]}"] for k in (i, j)],
-                **self.problem.given(*given),
-            )
+        self.problem.bind(
+            keep_apart(self.joints[i], self.joints[j], bool(self._servos)),
+            **shapes,
+            angles=[r["angles"].combine(weights) for r in both],
+            frames=[self.problem[f"frames{self.contacts[k]}"] for k in (i, j)],
+            **self.problem.given("link_radius", "margin", *self._servos),
+        )
+
+    @property
+    def _servos(self) -> tuple[str, ...]:
+        """The parameter that fingers with servos in their joints have more."""
+        return ("servo_radius",) if self.target.model.servo else ()
 
     def solve(
         self, seeds: tuple[FingerSeed, ...], weights: Mapping[str, object], options: Options = OPTIONS

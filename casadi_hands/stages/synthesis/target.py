@@ -58,11 +58,6 @@ class Target:
         return self.model.link_length
 
     @property
-    def bend(self) -> float:
-        """Largest of a link at zero angle, rad."""
-        return self.model.bend
-
-    @property
     def joint_limits(self) -> tuple[float, float]:
         """Lower and upper, rad."""
         return self.model.joint_limits

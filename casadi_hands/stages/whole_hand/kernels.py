@@ -76,8 +76,8 @@ def move(joints: int) -> Kernel:
 
 
 @cache
-def object_clearance(joints: int, kinds: tuple[type[Body], ...], moves: bool) -> Kernel:
-    """One finger against object, palm, ground and itself at one sample (eq. 2.20)."""
+def object_clearance(joints: int, kinds: tuple[type[Body], ...], moves: bool, servos: bool = False) -> Kernel:
+    """One finger, and servos in its joints if it has any, against object, palm, ground and itself (eq. 2.20)."""
     kernel = Kernel("object_clearance")
     pose, angles = kernel.variable("pose", 6), kernel.variable("angles", joints)
     palm = Palm(kernel, moves)
@@ -96,18 +96,25 @@ def object_clearance(joints: int, kinds: tuple[type[Body], ...], moves: bool) ->
     in_palm = [body.mapped(seen) for body in bodies]
     here = symbols.placed(angles, radius)
     up = palm.turned(SX([0, 0, 1]))
-    apart, touching = distances(here, radius, palm_radius, in_palm, up, ground - palm.position[2])
+    servo = kernel.parameter("servo_radius") if servos else None
+    apart, touching = distances(here, radius, palm_radius, in_palm, up, ground - palm.position[2], servo)
     folds = clearance.unfolded(here.ends, radius)
     kernel.cost(clearance.COLLISION, clearance.overlap(ca.vertcat(margin - apart, -touching, -folds)))
     return kernel
 
 
 def distances(
-    here: PlacedFinger, radius: SX, palm_radius: SX, bodies: Sequence[Surface], up: SX | None, ground: SX
+    here: PlacedFinger,
+    radius: SX,
+    palm_radius: SX,
+    bodies: Sequence[Surface],
+    up: SX | None,
+    ground: SX,
+    servo: SX | None = None,
 ) -> tuple[SX, SX]:
     """Distances between one finger and all but other fingers: those to keep apart, and the touching link's (K,).
 
-    Without a ground ``up`` is None.
+    Without a ground ``up`` is None, and so is ``servo``, the radius of a joint's ball with its servo, without these.
     """
     ends = here.ends
     apart = [clearance.links_and_palm(ends, radius, palm_radius), clearance.links_of_one(ends, radius)]
@@ -115,56 +122,22 @@ def distances(
         apart.append(clearance.links_and_ground(ends, radius, up, ground))
     if len(ends) > 1:
         apart.append(clearance.links_and_object(ends[:-1], radius, bodies))
+    if servo is not None:
+        apart.append(clearance.servos_and_rest(ends, radius, servo, palm_radius, bodies, up, ground))
     return ca.vertcat(*apart), clearance.links_and_object(ends[-1:], radius, bodies)
 
 
 @cache
-def finger_clearance(joints: int, other_joints: int) -> Kernel:
-    """Two fingers against each other at one sample (eq. 2.20)."""
+def finger_clearance(joints: int, other_joints: int, servos: bool = False) -> Kernel:
+    """Two fingers, and servos in their joints if they have any, against each other at one sample (eq. 2.20)."""
     kernel = Kernel("finger_clearance")
     angles = kernel.variable("angles0", joints, "angles", 0)
     other_angles = kernel.variable("angles1", other_joints, "angles", 1)
     first, second = given_morphology(kernel, joints, 0), given_morphology(kernel, other_joints, 1)
     radius, margin = kernel.parameter("link_radius"), kernel.parameter("margin")
-    apart = clearance.links_and_links(
-        first.placed(angles, radius).ends, second.placed(other_angles, radius).ends, radius
-    )
-    kernel.cost(clearance.COLLISION, clearance.overlap(margin - apart))
-    return kernel
-
-
-@cache
-def servos(joints: int, kinds: tuple[type[Body], ...], moves: bool) -> Kernel:
-    """One finger's servos against object, palm, ground and the rest of the finger at one sample (eq. 2.20)."""
-    kernel = Kernel("servos_and_rest")
-    pose, angles = kernel.variable("pose", 6), kernel.variable("angles", joints)
-    palm = Palm(kernel, moves)
-    symbols = given_morphology(kernel, joints)
-    reference = kernel.parameter("reference", 4)
-    radius, servo, palm_radius, ground, margin = (
-        kernel.parameter(name) for name in ("link_radius", "servo_radius", "palm_radius", "ground_height", "margin")
-    )
-    bodies = surfaces(kinds, kernel.parameter("bodies", width_of(kinds)))
-    position, quaternion = placed(pose, reference)
-    rotation = rotation_matrix(quaternion)
-    seen = [body.mapped(lambda point: palm.sees(position + ca.mtimes(rotation, point))) for body in bodies]
-    ends = symbols.placed(angles, radius).ends
-    up, height = palm.turned(SX([0, 0, 1])), ground - palm.position[2]
-    apart = clearance.servos_and_rest(ends, radius, servo, palm_radius, seen, up, height)
-    kernel.cost(clearance.COLLISION, clearance.overlap(margin - apart))
-    return kernel
-
-
-@cache
-def servos_of_two(joints: int, other_joints: int) -> Kernel:
-    """The servos of two fingers against each other and each other's links at one sample (eq. 2.20)."""
-    kernel = Kernel("servos_of_two")
-    angles = kernel.variable("angles0", joints, "angles", 0)
-    other_angles = kernel.variable("angles1", other_joints, "angles", 1)
-    first, second = given_morphology(kernel, joints, 0), given_morphology(kernel, other_joints, 1)
-    radius, servo, margin = (kernel.parameter(name) for name in ("link_radius", "servo_radius", "margin"))
+    servo = kernel.parameter("servo_radius") if servos else None
     ends = first.placed(angles, radius).ends, second.placed(other_angles, radius).ends
-    kernel.cost(clearance.COLLISION, clearance.overlap(margin - clearance.servos_and_finger(*ends, radius, servo)))
+    kernel.cost(clearance.COLLISION, clearance.overlap(margin - clearance.two_fingers(*ends, radius, servo)))
     return kernel
 
 

@@ -13,7 +13,8 @@ from scipy.interpolate import CubicSpline
 from casadi_hands.geometry.bodies import packed, width_of
 from casadi_hands.kinematics.morphology import FingerSeed
 from casadi_hands.kinematics.numeric import contact_kinematics
-from casadi_hands.nlp import Kernel, Options, Parameter, Problem, Rows, Solution, Solver
+from casadi_hands.kinematics.symbols import morphology_sizes
+from casadi_hands.nlp import Options, Parameter, Problem, Rows, Solution, Solver
 from casadi_hands.problem.floating_motion import Floating
 from casadi_hands.problem.hand_motion import WholeHand, turned
 from casadi_hands.problem.model import Model, palm_from_world, sampled_points, sizes
@@ -64,7 +65,7 @@ class WholeHandStage:
         for name, width in (("palm_position", 3), ("palm_quaternion", 4)):
             problem.parameter(f"{name}_before", (samples, width), quantity=name, when=-1)
         for c, n in zip(contacts, joints, strict=True):
-            for name, width in (("frames", 9 * n), ("base", 2), ("lengths", n), ("axes", 2 * n), ("bends", 2 * n)):
+            for name, width in {"frames": 9 * n, **morphology_sizes(n)}.items():
                 problem.parameter(f"{name}{c}", (1, width), quantity=name, owner=c)
         for c in contacts:
             self._bind_finger(side, c, angles, palm)
@@ -106,28 +107,26 @@ class WholeHandStage:
         limits = problem.given("lowest", "highest", "step")
         problem.bind(kernels.move(joints[c]), angles=(before, now, after), **shape, **limits)
         around = ("reference", "link_radius", "palm_radius", "ground_height", "margin", "bodies", *palm_pose)
-        blocks: list[tuple[Kernel, tuple[str, ...]]] = [
-            (kernels.object_clearance(joints[c], model.kinds, self.palm_moves), around)
-        ]
-        if model.servo:
-            blocks.append((kernels.servos(joints[c], model.kinds, self.palm_moves), (*around, "servo_radius")))
-        for kernel, names in blocks:
-            problem.bind(kernel, pose=side.pose[1], angles=now, **moved, **shape, **problem.given(*names))
+        servos = ("servo_radius",) if model.servo else ()
+        problem.bind(
+            kernels.object_clearance(joints[c], model.kinds, self.palm_moves, bool(servos)),
+            pose=side.pose[1],
+            angles=now,
+            **moved,
+            **shape,
+            **problem.given(*around, *servos),
+        )
         for d in self.contacts[: self.contacts.index(c)]:
-            other, pair = self._morphology(d), ("link_radius", "margin")
-            blocks = [(kernels.finger_clearance(joints[c], joints[d]), pair)]
-            if model.servo:
-                blocks.append((kernels.servos_of_two(joints[c], joints[d]), (*pair, "servo_radius")))
-            for kernel, names in blocks:
-                problem.bind(
-                    kernel,
-                    angles=(now, angles[d].combine(schedule.spline())),
-                    **{name: (shape[name], other[name]) for name in shape},
-                    **problem.given(*names),
-                )
+            other = self._morphology(d)
+            problem.bind(
+                kernels.finger_clearance(joints[c], joints[d], bool(servos)),
+                angles=(now, angles[d].combine(schedule.spline())),
+                **{name: (shape[name], other[name]) for name in shape},
+                **problem.given("link_radius", "margin", *servos),
+            )
 
     def _morphology(self, contact: int) -> dict[str, Parameter]:
-        return {name: self.problem[f"{name}{contact}"] for name in ("frames", "base", "lengths", "axes", "bends")}
+        return {name: self.problem[f"{name}{contact}"] for name in ("frames", *morphology_sizes(0))}
 
     def solve(
         self,
