@@ -23,7 +23,7 @@ from casadi_hands.verify.figures.contact import (
     slip_figure,
     spin_figure,
 )
-from casadi_hands.verify.figures.coupling import coupling_figures, motor_speed_figure, motor_torque_figure
+from casadi_hands.verify.figures.coupling import coupling_figures, motor_speed_figure
 from casadi_hands.verify.figures.disturbances import disturbed_figures
 from casadi_hands.verify.figures.dynamics import Shots, between_residual, sample_residual, shoot
 from casadi_hands.verify.figures.goals import goal_figures, rest_figure
@@ -100,11 +100,8 @@ def audit_files(directory: str | Path, task: str | Path | None = None) -> Audit:
         spin_figure(folder, path),
         penetration_figure(folder, path),
         joint_figure(folder, path),
-        *(
-            [speed_figure(folder, path), torque_figure(folder)]
-            if folder.drive is None
-            else [motor_speed_figure(folder, folder.drive), motor_torque_figure(folder, folder.drive)]
-        ),
+        speed_figure(folder, path) if folder.drive is None else motor_speed_figure(folder, folder.drive),
+        torque_figure(folder),
         *coupling_figures(folder),
         unsupplied_figure(folder),
         disturbance_figure(folder, placed),

@@ -94,6 +94,22 @@ class Figure:
         return self.text if self.limit is None else f"{self.text}; limit {show(self.limit, self.unit)}"
 
 
+def of_actuator(name: str, value: float, where: str, most: float | None, limit: float, unit: str) -> Figure:
+    """Return what is asked of an actuator: a share of what the task's does, where it names that, else in its unit.
+
+    Args:
+        name: of the figure, and what the actuator has it of.
+        value: asked, in ``unit``.
+        where: as a phrase.
+        most: of the task's actuator; None where it names none.
+        limit: of the share.
+        unit: of the value.
+    """
+    if most is None:
+        return Figure(name, value, None, unit, f"{{value}} in {where}")
+    return Figure(name, value / most, limit, "share", f"{{value}} of the actuator's {name} in {where}")
+
+
 @dataclass(frozen=True)
 class Audit:
     """All figures of one design.

@@ -8,7 +8,7 @@ import numpy as np
 
 from casadi_hands.verify.bodies import Body, body_distance
 from casadi_hands.verify.reading.folder import Folder
-from casadi_hands.verify.report import Figure, worse
+from casadi_hands.verify.report import Figure, of_actuator, worse
 from casadi_hands.verify.trajectory import DENSITY, Trajectory
 
 
@@ -84,16 +84,13 @@ def joint_figure(folder: Folder, path: Trajectory) -> Figure:
 
 
 def speed_figure(folder: Folder, path: Trajectory) -> Figure:
-    """Return the largest joint speed: a share of the actuator's where the task names one, else in rad/s."""
+    """Return the largest speed of a joint."""
     speed = np.abs(path.speeds)
     i, j = np.unravel_index(np.argmax(speed), speed.shape)
     name = folder.motion.joint_names[j]
     where = f"joint {name} of {_finger(folder, name)} at {path.time[i]:.3g} s"
-    if folder.task.actuator.speed is None:
-        return Figure("speed", float(speed[i, j]), None, "rad/s", f"{{value}} in {where}")
-    share = float(speed[i, j]) / folder.task.actuator.speed
-    limit = folder.task.limits.speed
-    return Figure("speed", share, limit, "share", f"{{value}} of the actuator's speed in {where}")
+    named, limit = folder.task.actuator.speed, folder.task.limits.speed
+    return of_actuator("speed", float(speed[i, j]), where, named, limit, "rad/s")
 
 
 def _finger(folder: Folder, joint: str) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 from casadi_hands.verify.figures.wrench import planned_torques
 from casadi_hands.verify.reading.drive import Drive
 from casadi_hands.verify.reading.folder import Folder
-from casadi_hands.verify.report import Figure, worse
+from casadi_hands.verify.report import Figure, of_actuator
 
 
 def coupling_figures(folder: Folder) -> list[Figure]:
@@ -32,20 +32,6 @@ def _off_lines(folder: Folder, drive: Drive) -> Figure:
     return Figure("coupling", float(off[k, j]), folder.task.limits.coupling, "rad", words)
 
 
-def motor_torque_figure(folder: Folder, drive: Drive) -> Figure:
-    """Return the largest torque of a motor, by virtual work from those of the joints, as ``torque_figure`` does."""
-    worst = (0.0, "no motor presses")
-    for scenario, forces, _ in folder.scenarios():
-        torques = np.abs(planned_torques(folder, forces) @ drive.ratios)
-        k, m = np.unravel_index(np.argmax(torques), torques.shape)
-        worst = worse(worst, (float(torques[k, m]), f"{drive.names[m]} at {folder.motion.time[k]:.3g} s{scenario}"))
-    value, where = worst
-    if folder.task.actuator.torque is None:
-        return Figure("torque", value, None, "N·m", f"{{value}} in {where}")
-    share = value / folder.task.actuator.torque
-    return Figure("torque", share, folder.task.limits.torque, "share", f"{{value}} of the actuator's torque in {where}")
-
-
 def motor_speeds(folder: Folder) -> np.ndarray:
     """Return the speeds (S - 1, N) of the motors that share joints, which go straight from sample to sample, rad/s."""
     assert folder.motion.motor_positions is not None
@@ -57,7 +43,4 @@ def motor_speed_figure(folder: Folder, drive: Drive) -> Figure:
     speeds = np.abs(motor_speeds(folder))
     k, m = np.unravel_index(np.argmax(speeds), speeds.shape)
     value, where = float(speeds[k, m]), f"{drive.names[m]} at {folder.motion.time[k]:.3g} s"
-    if folder.task.actuator.speed is None:
-        return Figure("speed", value, None, "rad/s", f"{{value}} in {where}")
-    share = value / folder.task.actuator.speed
-    return Figure("speed", share, folder.task.limits.speed, "share", f"{{value}} of the actuator's speed in {where}")
+    return of_actuator("speed", value, where, folder.task.actuator.speed, folder.task.limits.speed, "rad/s")

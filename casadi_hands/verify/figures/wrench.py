@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from casadi_hands.verify.figures.contact import Placements, active_contacts, surface_normals
 from casadi_hands.verify.reading.folder import Folder
-from casadi_hands.verify.report import Figure, worse
+from casadi_hands.verify.report import Figure, of_actuator, worse
 
 LEAST_LEVER = 0.05
 """A direction of force counts as supplied when its lever is at least this share of half the object's extent."""
@@ -70,18 +70,15 @@ def in_palm(folder: Folder, k: int, force: np.ndarray) -> np.ndarray:
 
 
 def torque_figure(folder: Folder) -> Figure:
-    """Return the largest joint torque: a share of the actuator's where the task names one, else in N·m."""
-    worst = (0.0, "no joint presses")
+    """Return the largest torque of a joint or, where joints share motors, of a motor, by virtual work."""
+    drive, worst = folder.drive, (0.0, "no joint presses")
+    names = [f"joint {name}" for name in folder.motion.joint_names] if drive is None else drive.names
     for scenario, forces, _ in folder.scenarios():
-        torques = np.abs(planned_torques(folder, forces))
+        torques = planned_torques(folder, forces)
+        torques = np.abs(torques if drive is None else torques @ drive.ratios)
         k, j = np.unravel_index(np.argmax(torques), torques.shape)
-        where = f"joint {folder.motion.joint_names[j]} at {folder.motion.time[k]:.3g} s{scenario}"
-        worst = worse(worst, (float(torques[k, j]), where))
-    value, where = worst
-    if folder.task.actuator.torque is None:
-        return Figure("torque", value, None, "N·m", f"{{value}} in {where}")
-    share = value / folder.task.actuator.torque
-    return Figure("torque", share, folder.task.limits.torque, "share", f"{{value}} of the actuator's torque in {where}")
+        worst = worse(worst, (float(torques[k, j]), f"{names[j]} at {folder.motion.time[k]:.3g} s{scenario}"))
+    return of_actuator("torque", *worst, folder.task.actuator.torque, folder.task.limits.torque, "N·m")
 
 
 def unsupplied_figure(folder: Folder) -> Figure:
