@@ -12,9 +12,11 @@ from casadi_hands.geometry.bodies.body import Core
 from casadi_hands.geometry.bodies.capsule import Segment
 from casadi_hands.geometry.bodies.sphere import Point
 from casadi_hands.geometry.segments import point_segment_distance, segment_distance
-from casadi_hands.geometry.smooth import clamp, norm
+from casadi_hands.geometry.smooth import clamp, constant
 
 _ROUNDS = 12  # of false position
+_TIE = 1e-4  # least bend of a distance along a segment, a share of its squared length over a length
+_STEP = 1e-3  # longest of the last step, a share of the segment
 _ROUNDING = 1e-4  # value of the distance of bodies that cross
 
 
@@ -29,12 +31,17 @@ def _segment_and_point(one: Segment, other: Point) -> SX:
 def _segment_and_core(one: Segment, other: Core) -> SX:
     """The least over the segment of the distance from a convex set, which is convex: where its slope vanishes.
 
-    The root is bracketed by the segment's ends and narrowed by false position (Illinois).
+    The root is bracketed by the segment's ends and narrowed by false position (Illinois), whose steps are constants to
+    derivatives; a step of Newton's from where they end has those of the root. Where the segment runs along a face, so
+    that all of it is as near, that step is held back.
     """
     along = one.end - one.start
+    share = SX.sym("share")
+    slope_at = other.slope(one.start + share * along, along)
+    bend_at = ca.gradient(slope_at, share) + _TIE * ca.sumsqr(along)
 
-    def slope(share: SX) -> SX:
-        return ca.dot(other.offset(one.start + share * along), along)
+    def slope(where: SX) -> SX:
+        return ca.substitute(slope_at, share, where)
 
     def within(low: SX, high: SX, below: SX, above: SX) -> SX:
         # Clamped, since the slopes at both ends of the bracket may vanish.
@@ -44,14 +51,16 @@ def _segment_and_core(one: Segment, other: Core) -> SX:
     below, above = slope(low), slope(high)
     first, last = below >= 0, above <= 0  # where the nearest point is an end
     for _ in range(_ROUNDS):
-        share = within(low, high, below, above)
-        here = slope(share)
+        where = within(low, high, below, above)
+        here = slope(where)
         before = here < 0
-        low, high = ca.if_else(before, share, low), ca.if_else(before, high, share)
+        low, high = ca.if_else(before, where, low), ca.if_else(before, high, where)
         below, above = ca.if_else(before, here, below / 2), ca.if_else(before, above / 2, here)
-    share = ca.if_else(first, 0, ca.if_else(last, 1, within(low, high, below, above)))
-    point = one.start + share * along
-    return norm(other.offset(point), _ROUNDING) - other.depth(point)
+    found = constant(within(low, high, below, above))
+    step = -slope(found) / ca.substitute(bend_at, share, found)
+    newton = clamp(found + clamp(step, -_STEP, _STEP), 0, 1)
+    nearest = one.start + ca.if_else(first, 0, ca.if_else(last, 1, newton)) * along
+    return other.distance_and_normal(nearest, _ROUNDING)[0]
 
 
 _TABLE: dict[tuple[type[Core], type[Core]], Callable[[Any, Any], SX]] = {

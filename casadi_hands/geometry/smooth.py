@@ -5,6 +5,8 @@ from __future__ import annotations
 import casadi as ca
 from casadi import SX
 
+_GRAINS = 2**36
+
 
 def norm(vector: SX, rounding: float = 1e-9) -> SX:
     """Euclidean length, rounded off at zero.
@@ -19,6 +21,11 @@ def norm(vector: SX, rounding: float = 1e-9) -> SX:
 def clamp(value: SX, lower: float, upper: float) -> SX:
     """``value`` kept within [lower, upper]; its derivative jumps at both ends."""
     return ca.fmin(ca.fmax(value, lower), upper)
+
+
+def constant(value: SX) -> SX:
+    """``value``, to ten digits, as what derivatives take for a constant: that of a floor is zero."""
+    return ca.floor(value * _GRAINS + 0.5) / _GRAINS
 
 
 def penalty_spline(x: SX, epsilon: float) -> SX:

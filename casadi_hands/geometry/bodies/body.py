@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar, Literal, Self
 
+import casadi as ca
 import numpy as np
 from casadi import SX
 from numpy.typing import NDArray
@@ -60,6 +61,21 @@ class Core(ABC):
         """How deep a point is within the core, zero outside: what its distance is continued by there."""
         return SX(0)
 
+    def distance_and_normal(self, point: SX, rounding: float) -> tuple[SX, SX]:
+        """Signed distance of a point (3,) from the core, and the outward unit normal (3,) nearest to it.
+
+        Args:
+            point: any.
+            rounding: of the distance where it vanishes.
+        """
+        offset = self.offset(point)
+        distance = norm(offset, rounding)
+        return distance - self.depth(point), offset / distance
+
+    def slope(self, point: SX, along: SX) -> SX:
+        """Something of the sign that the change of the distance has at a point (3,) that moves along a vector (3,)."""
+        return ca.dot(self.offset(point), along)
+
 
 @dataclass(frozen=True)
 class Surface:
@@ -74,16 +90,13 @@ class Surface:
 
     def distance_and_normal(self, point: SX, rounding: float = 1e-9) -> tuple[SX, SX]:
         """Signed distance of a point (3,), negative inside, and the outward unit normal (3,) nearest to it."""
-        offset = self.core.offset(point)
-        distance = norm(offset, rounding)
-        return distance - self.core.depth(point) - self.radius, offset / distance
+        distance, normal = self.core.distance_and_normal(point, rounding)
+        return distance - self.radius, normal
 
     def project(self, point: SX) -> tuple[SX, SX]:
         """The nearest point (3,) of the surface and the outward unit normal there (3,)."""
-        offset = self.core.offset(point)
-        distance = norm(offset)
-        normal = offset / distance
-        return point + (self.radius - (distance - self.core.depth(point))) * normal, normal
+        distance, normal = self.core.distance_and_normal(point, 1e-9)
+        return point + (self.radius - distance) * normal, normal
 
 
 @dataclass(frozen=True, eq=False)
