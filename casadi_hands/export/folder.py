@@ -9,6 +9,7 @@ from typing import Any
 from casadi_hands.errors import DesignError, TaskError
 from casadi_hands.export.arrays import load_motion, save_motion
 from casadi_hands.export.commands import commanded
+from casadi_hands.export.meshes import FOLDER, mesh_files
 from casadi_hands.export.mjcf import scene_mjcf
 from casadi_hands.export.page.page import write_page
 from casadi_hands.export.record import FORMAT, STATUSES, design_record, hand_from_record, record_text
@@ -48,8 +49,7 @@ def save_design(design: Result, directory: Path, page: bool = True) -> None:
         raise DesignError(f"a design's status is one of {', '.join(STATUSES)}, not {design.status!r}")
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        for name in _FILES:
-            (directory / name).unlink(missing_ok=True)
+        _remove(directory)
         _write(design, directory, page)
     except OSError as error:
         raise DesignError(f"{directory}: cannot write the design here: {error}") from error
@@ -64,7 +64,10 @@ def _write(design: Result, directory: Path, page: bool) -> None:
             if motion.joint_commands is None:
                 motion = commanded(design.task, design.hand, motion)
             texts["scene.xml"] = scene_mjcf(design.task, design.hand, motion)
-    for name, text in texts.items():
+    meshes = mesh_files(design.task)
+    if meshes:
+        (directory / FOLDER).mkdir(exist_ok=True)
+    for name, text in {**meshes, **texts}.items():
         (directory / name).write_text(text, encoding="utf-8")
     if motion is not None:
         save_motion(motion, directory / "motion.npz")
@@ -73,6 +76,18 @@ def _write(design: Result, directory: Path, page: bool) -> None:
     if page:
         write_page(design, directory / "viewer.html")
     (directory / "result.json").write_text(record_text(design_record(design)), encoding="utf-8")
+
+
+def _remove(directory: Path) -> None:
+    """Remove a design's files and meshes."""
+    for name in _FILES:
+        (directory / name).unlink(missing_ok=True)
+    meshes = directory / FOLDER
+    if meshes.is_dir():
+        for path in meshes.glob("object*.obj"):
+            path.unlink()
+        if not any(meshes.iterdir()):
+            meshes.rmdir()
 
 
 def remove_design(directory: Path) -> None:
@@ -85,8 +100,7 @@ def remove_design(directory: Path) -> None:
         DesignError: the files cannot be removed.
     """
     try:
-        for name in _FILES:
-            (directory / name).unlink(missing_ok=True)
+        _remove(directory)
         if directory.is_dir() and not any(directory.iterdir()):
             directory.rmdir()
     except OSError as error:

@@ -35,14 +35,14 @@ from casadi_hands.export.markup import (
     GROUND_COLOR,
     OBJECT_COLOR,
     PALM_COLOR,
-    Color,
     document,
     finger_color,
     number,
     numbers,
 )
+from casadi_hands.export.meshes import object_solids
+from casadi_hands.export.mjcf_solids import add_inertial, add_meshes, add_solid
 from casadi_hands.export.shared_motors import add_motors
-from casadi_hands.geometry.bodies import Solid
 from casadi_hands.problem.inertia import Inertial, body_inertials
 from casadi_hands.problem.motors import Motor, joint_motors, shared_motors
 
@@ -74,6 +74,7 @@ def scene_mjcf(task: Task, hand: Hand, motion: Motion) -> str:
     motors = joint_motors(task, hand)
     root = Element("mujoco", model=task.name)
     _add_settings(root, task)
+    add_meshes(root, task)
     world = SubElement(root, "worldbody")
     SubElement(world, "light", pos=numbers(motion.object_position[0] + [0, 0, 20 * task.object.characteristic_length]))
     if task.ground is not None:
@@ -167,11 +168,10 @@ def _add_object(world: Element, task: Task, motion: Motion) -> None:
     body = SubElement(world, "body", start, name="object")
     SubElement(body, "freejoint", name="object")
     item = task.object
-    _add_inertial(body, Inertial(item.mass, np.asarray(item.center_of_mass), np.asarray(item.inertia)))
-    for k, shape in enumerate(item.shapes):
-        geom = {"name": f"object{k}", "priority": "1", "friction": _friction(task)}
-        for solid in shape.body.solids():
-            _add_solid(body, geom, solid, OBJECT_COLOR)
+    add_inertial(body, Inertial(item.mass, np.asarray(item.center_of_mass), np.asarray(item.inertia)))
+    for name, solid in object_solids(task).items():
+        geom = {"name": name, "priority": "1", "friction": _friction(task)}
+        add_solid(body, geom, solid, OBJECT_COLOR)
 
 
 def _add_hand(world: Element, task: Task, hand: Hand, motion: Motion, motors: tuple[Motor, ...], moves: bool) -> None:
@@ -183,7 +183,7 @@ def _add_hand(world: Element, task: Task, hand: Hand, motion: Motion, motors: tu
     if moves:
         SubElement(palm, "freejoint", name="palm")
     inertials = body_inertials(hand)
-    _add_inertial(palm, inertials["palm"])
+    add_inertial(palm, inertials["palm"])
     friction = _friction(task)
     SubElement(
         palm,
@@ -196,7 +196,7 @@ def _add_hand(world: Element, task: Task, hand: Hand, motion: Motion, motors: tu
         rgba=numbers((*PALM_COLOR, 1.0)),
     )
     for k, ball in enumerate(hand.palm_balls):
-        _add_solid(palm, {"name": f"palm_ball{k}", "friction": friction}, ball, PALM_COLOR)
+        add_solid(palm, {"name": f"palm_ball{k}", "friction": friction}, ball, PALM_COLOR)
     remaining = iter(motors)
     for i, finger in enumerate(hand.fingers):
         names = [f"finger{i}_joint{j}" for j in range(len(finger.links))]
@@ -240,25 +240,9 @@ def _add_finger(
             range=numbers((hand.joint_lower, hand.joint_upper)),
             armature=number(motor.armature),
         )
-        _add_inertial(body, inertials[name])
-        _add_solid(body, {"name": name, "friction": friction}, link.solid, finger_color(i))
+        add_inertial(body, inertials[name])
+        add_solid(body, {"name": name, "friction": friction}, link.solid, finger_color(i))
         parent, origin = body, link.solid.end
-
-
-def _add_inertial(body: Element, inertial: Inertial) -> None:
-    """Add mass, centre of mass and inertia."""
-    tensor = inertial.inertia
-    full = (tensor[0, 0], tensor[1, 1], tensor[2, 2], tensor[0, 1], tensor[0, 2], tensor[1, 2])
-    SubElement(body, "inertial", pos=numbers(inertial.center), mass=number(inertial.mass), fullinertia=numbers(full))
-
-
-def _add_solid(body: Element, attributes: dict[str, str], solid: Solid, color: Color) -> None:
-    """Add a geom."""
-    attributes = {**attributes, "rgba": numbers((*color, 1.0)), "type": solid.kind, "size": number(solid.radius)}
-    if solid.kind == "sphere":
-        SubElement(body, "geom", attributes, pos=numbers(solid.start))
-    else:
-        SubElement(body, "geom", attributes, fromto=numbers((*solid.start, *solid.end)))
 
 
 def _add_actuators(root: Element, joints: Sequence[str], motors: tuple[Motor, ...], effort: float) -> None:

@@ -1,4 +1,4 @@
-"""The hand and the object as URDF, with every shape a sphere or a cylinder so that no mesh file is needed."""
+"""The hand and the object as URDF: spheres, cylinders and boxes; what is convex in files beside it."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from casadi_hands.export.markup import (
     number,
     numbers,
 )
+from casadi_hands.export.meshes import mesh_path, object_solids, polytopes
 from casadi_hands.geometry.bodies import Solid
 from casadi_hands.problem.inertia import Case, Inertial, body_inertials, servo_cases
 
@@ -75,12 +76,16 @@ def object_urdf(task: Task) -> str:
     Args:
         task: its object gives shapes, mass and inertia.
     """
-    robot = _robot("object")
+    robot = _robot("object", meshes=bool(polytopes(task)))
     link = SubElement(robot, "link", name="object")
     body = task.object
     _add_inertial(link, Inertial(body.mass, np.asarray(body.center_of_mass), np.asarray(body.inertia)))
-    for shape in body.shapes:
-        for solid in shape.body.solids():
+    for name, solid in object_solids(task).items():
+        if solid.kind == "convex":
+            for role in ("visual", "collision"):
+                mesh = Element("mesh", filename=mesh_path(name))
+                _add_shape(link, role, mesh, np.zeros(3), (0.0, 0.0, 0.0), OBJECT_COLOR)
+        else:
             _add_solid(link, solid, OBJECT_COLOR, OBJECT_COLOR)
     return document(robot)
 
@@ -93,10 +98,16 @@ def _roll_pitch_yaw(turn: np.ndarray) -> tuple[float, float, float]:
     return float(np.arctan2(-across[2], across[1])), float(np.arctan2(-turn[2, 0], level)), yaw
 
 
-def _robot(name: str) -> Element:
-    """An empty robot; MuJoCo would otherwise merge the root link into its world and drop its mass."""
+def _robot(name: str, meshes: bool = False) -> Element:
+    """An empty robot; MuJoCo would otherwise merge the root link into its world and drop its mass.
+
+    Args:
+        name: of it.
+        meshes: whether it has files of meshes, whose folder MuJoCo would otherwise leave out.
+    """
     robot = Element("robot", name=name)
-    SubElement(SubElement(robot, "mujoco"), "compiler", fusestatic="false")
+    compiler = {"fusestatic": "false"} | ({"strippath": "false"} if meshes else {})
+    SubElement(SubElement(robot, "mujoco"), "compiler", compiler)
     return robot
 
 
@@ -185,6 +196,11 @@ def _add_inertial(link: Element, inertial: Inertial) -> None:
 
 def _add_solid(link: Element, solid: Solid, color: Color, end_color: Color) -> None:
     """Add a solid; a capsule as cylinder and two spheres."""
+    if solid.kind == "box":
+        for role in ("visual", "collision"):
+            box = Element("box", size=numbers(solid.size))
+            _add_shape(link, role, box, solid.start, _roll_pitch_yaw(solid.turn), color)
+        return
     start, end, radius = solid.start, solid.end, solid.radius
     axis = end - start
     length = float(np.linalg.norm(axis))

@@ -36,12 +36,7 @@ def _segment_and_core(one: Segment, other: Core) -> SX:
     that all of it is as near, that step is held back.
     """
     along = one.end - one.start
-    share = SX.sym("share")
-    slope_at = other.slope(one.start + share * along, along)
-    bend_at = ca.gradient(slope_at, share) + _TIE * ca.sumsqr(along)
-
-    def slope(where: SX) -> SX:
-        return ca.substitute(slope_at, share, where)
+    slope = other.slopes(one.start, along)
 
     def within(low: SX, high: SX, below: SX, above: SX) -> SX:
         # Clamped, since the slopes at both ends of the bracket may vanish.
@@ -57,7 +52,9 @@ def _segment_and_core(one: Segment, other: Core) -> SX:
         low, high = ca.if_else(before, where, low), ca.if_else(before, high, where)
         below, above = ca.if_else(before, here, below / 2), ca.if_else(before, above / 2, here)
     found = constant(within(low, high, below, above))
-    step = -slope(found) / ca.substitute(bend_at, share, found)
+    share = SX.sym("share")
+    bend = ca.substitute(ca.gradient(slope(share), share), share, found) + _TIE * ca.sumsqr(along)
+    step = -slope(found) / bend
     newton = clamp(found + clamp(step, -_STEP, _STEP), 0, 1)
     nearest = one.start + ca.if_else(first, 0, ca.if_else(last, 1, newton)) * along
     return other.distance_and_normal(nearest, _ROUNDING)[0]

@@ -43,7 +43,7 @@ def build_model(task: Task) -> Model:
     times, places, turns = zip(*task.palm.waypoints, strict=True)
     goal_times = [goal.at for goal in task.motion]
     schedule = Schedule.of(goal_times, task.duration, task.keyframes_between, task.time_step, times)
-    bodies = tuple(type(s.body).of(round_off(s.body.parameters / length)) for s in task.object.shapes)
+    bodies = tuple(s.body.measured(lambda lengths: round_off(lengths / length)) for s in task.object.shapes)
     positions, vectors, reference = _goals(task)
     palm_path = PalmPath(np.array(times), round_off(np.array(places) / length), np.array(turns))
     palm = palm_path.at(schedule.samples)

@@ -20,7 +20,10 @@ from pydantic import (
 )
 
 from casadi_hands.geometry.bodies import KINDS, Body
-from casadi_hands.task.fields import Positive, Section, Vector, refuse, vector
+from casadi_hands.task.fields import Positive, Section, Vector, follows, refuse, vector
+from casadi_hands.task.rotation import UPRIGHT, Rotation
+
+MOST_POINTS = 500
 
 
 class Primitive(Section):
@@ -30,8 +33,7 @@ class Primitive(Section):
     def body(self) -> Body:
         """The body, m, object frame."""
         kind = KINDS[type(self).__name__.lower()]
-        given = {name: getattr(self, name) for name in type(self).model_fields}
-        return kind(**{name: np.array(v) if isinstance(v, tuple) else v for name, v in given.items()})
+        return kind(**{name: _value(getattr(self, name)) for name in type(self).model_fields})
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
@@ -45,22 +47,50 @@ class Primitive(Section):
 
     def moved(self, by: np.ndarray) -> Primitive:
         """The same primitive shifted by ``by`` (3,), m."""
-        given = self.body.placed(np.eye(3), by).as_mapping()
-        return type(self)(**{name: vector(v) if isinstance(v, np.ndarray) else v for name, v in given.items()})
+        moved = {name: getattr(self, name) for name in type(self).model_fields}
+        for each in fields(KINDS[type(self).__name__.lower()]):
+            value = moved[each.name]
+            if each.metadata["is"] == "point":
+                moved[each.name] = vector(np.add(value, by))
+            elif each.metadata["is"] == "points":
+                moved[each.name] = tuple(vector(np.add(point, by)) for point in value)
+        return type(self)(**moved)
 
 
-_TYPES = {"point": Vector, "positive": Positive}
+def _value(given: Any) -> Any:
+    """A field as a body has it."""
+    if isinstance(given, Rotation):
+        return given.vector
+    return np.array(given) if isinstance(given, tuple) else given
+
+
+Points = Annotated[tuple[Vector, ...], Field(min_length=4, max_length=MOST_POINTS)]
+_TYPES: dict[str, Any] = {
+    "point": Vector,
+    "points": Points,
+    "positive": Positive,
+    "rotation": Rotation,
+    "sizes": tuple[Positive, Positive, Positive],
+}
+_DEFAULTS = {"rotation": (lambda: UPRIGHT, "not turned")}
 
 
 def _section(kind: type[Body]) -> Any:
     """The section of a task file that gives a body of a kind."""
     given: dict[str, Any] = {}
     for each in fields(kind):
+        what = each.metadata["is"]
         default = each.metadata.get("default")
-        more = {}
+        more: dict[str, Any] = {}
         if default is not None:
-            more = {"default_factory": default, "json_schema_extra": {"default": each.metadata["default_text"]}}
-        given[each.name] = (_TYPES[each.metadata["is"]], Field(description=each.metadata["about"], **more))
+            more = {
+                "default_factory": follows(default),
+                "json_schema_extra": {"default": each.metadata["default_text"]},
+            }
+        elif what in _DEFAULTS:
+            factory, text = _DEFAULTS[what]
+            more = {"default_factory": factory, "json_schema_extra": {"default": text}}
+        given[each.name] = (_TYPES[what], Field(description=each.metadata["about"], **more))
     return create_model(kind.__name__, __base__=Primitive, __doc__=kind.__doc__, **given)
 
 

@@ -8,7 +8,7 @@ from functools import cached_property
 import coal
 import numpy as np
 
-from casadi_hands.verify.box import Box
+from casadi_hands.verify.flat import Box
 from casadi_hands.verify.shapes import Capsule, Cylinder, HalfSpace, Shape
 
 _REQUEST = coal.DistanceRequest()

@@ -1,15 +1,14 @@
 """Solid shapes as files state them, measured in closed form, by coal and for Drake.
 
-To add a shape, add a class and, where an object may be made of it, how task files state it to `FORMS`. What a shape
+To add a shape, add a class and, where an object may be made of it, how task files state it to `forms`. What a shape
 does not say raises ``NotImplementedError``.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any
 
 import coal
 import numpy as np
@@ -81,11 +80,6 @@ class _Round(Shape):
     start: np.ndarray
     end: np.ndarray
     radius: float
-
-    @classmethod
-    def stated(cls, points: Sequence[np.ndarray], sizes: Sequence[float]) -> Self:
-        """Return the shape of points (3,) and lengths in the order of its form."""
-        return cls(points[0], points[-1], sizes[0])
 
     @property
     def length(self) -> float:
@@ -253,25 +247,3 @@ def _chord(radius: float, off: float) -> float:
 def _grown(radius: float, edge: float) -> float:
     """Return the radius with which a polygon of such edges lies about a circle, as far outside as inside."""
     return radius + edge**2 / (12 * radius)
-
-
-@dataclass(frozen=True)
-class Form:
-    """How task files and results state a shape that an object is made of.
-
-    Attributes:
-        shape: what it is.
-        points, sizes: names of its points and of its lengths.
-    """
-
-    shape: type[_Round]
-    points: tuple[str, ...]
-    sizes: tuple[str, ...] = ("radius",)
-
-
-FORMS = {
-    "sphere": Form(Capsule, ("center",)),
-    "capsule": Form(Capsule, ("start", "end")),
-    "cylinder": Form(Cylinder, ("start", "end"), ("radius", "edge_radius")),
-}
-"""By the kind's name."""

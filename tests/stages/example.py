@@ -191,7 +191,7 @@ def marks(capsule: Array) -> Array:
 def rods(bodies: Sequence[Body], parameters: Array) -> list[Array]:
     """The same (7,) of each of some bodies' kinds, from their parameters in one row."""
     parts = np.split(parameters, np.cumsum([body.width for body in bodies])[:-1])
-    return [rod(type(body).of(part)) for body, part in zip(bodies, parts, strict=True)]
+    return [part if body.width == 7 else np.r_[part[:3], part] for body, part in zip(bodies, parts, strict=True)]
 
 
 def nearest_on_axis(point: Array, capsule: Array) -> Array:

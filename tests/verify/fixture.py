@@ -42,6 +42,12 @@ class Scene:
         (directory / "task.yaml").write_text(task_to_yaml(self.task))
         (directory / "hand.urdf").write_text(hand_urdf(self.hand))
         (directory / "object.urdf").write_text(object_urdf(self.task))
+        for k, shape in enumerate(self.task.object.shapes):
+            kind, given = _shape_given(shape)
+            if kind == "convex":
+                (directory / "meshes").mkdir(exist_ok=True)
+                lines = [f"v {x!r} {y!r} {z!r}\n" for x, y, z in given["vertices"]]
+                (directory / "meshes" / f"{k}.obj").write_text("".join(lines))
         (directory / "scene.xml").write_text(scene_mjcf(self.task, self.hand, motion))
         given = {name: getattr(motion, name) for name in Motion.__dataclass_fields__}
         arrays: dict[str, Any] = {name: np.asarray(a) for name, a in given.items() if a is not None}
@@ -174,9 +180,9 @@ def object_urdf(task: Task) -> str:
     robot = ElementTree.Element("robot", name="object")
     link = _element(robot, "link", name="object")
     _inertial(link, task.object.mass, [0, 0, 0], np.asarray(task.object.inertia))
-    for shape in task.object.shapes:
+    for k, shape in enumerate(task.object.shapes):
         kind, given = _shape_given(shape)
-        _SOLIDS[kind](link, given)
+        _SOLIDS[kind](link, given | ({"file": f"meshes/{k}.obj"} if kind == "convex" else {}))
     return ElementTree.tostring(robot, encoding="unicode")
 
 
@@ -247,7 +253,23 @@ _SOLIDS: dict[str, Callable[[ElementTree.Element, dict[str, Any]], None]] = {
     "sphere": lambda link, given: _capsule(link, given["center"], given["center"], given["radius"]),
     "capsule": lambda link, given: _capsule(link, given["start"], given["end"], given["radius"]),
     "cylinder": lambda link, given: _cylinder(link, given["start"], given["end"], given["radius"]),
+    "box": lambda link, given: _flat(link, "box", given["center"], _box_turn(given), size=given["size"]),
+    "convex": lambda link, given: _flat(link, "mesh", [0, 0, 0], [0, 0, 0], filename=given["file"]),
 }
+
+
+def _flat(link: ElementTree.Element, kind: str, at: Any, turn: Any, **given: Any) -> None:
+    for role in ("visual", "collision"):
+        element = _element(link, role)
+        _element(element, "origin", xyz=at, rpy=turn)
+        _element(_element(element, "geometry"), kind, **given)
+
+
+def _box_turn(given: dict[str, Any]) -> np.ndarray:
+    axis = np.asarray(given["rotation"]["axis"]) / np.linalg.norm(given["rotation"]["axis"])
+    turn = Rotation.from_rotvec(np.radians(given["rotation"]["degrees"]) * axis)
+    angles: np.ndarray = turn.as_euler("xyz")
+    return angles
 
 
 MASS, RADIUS, TIP = 0.1, 0.02, 0.006
@@ -266,9 +288,13 @@ GRASP = np.vstack([np.hstack([np.eye(3)] * 3), np.hstack([_skew(point) for point
 NORMALS = np.array([[point[0], point[1], 0.0] for point in CONTACTS]) / RADIUS
 """(3, 3) outward, of the object's surface at the contacts."""
 
+_RIM = [(2 * RADIUS * np.cos(a), 2 * RADIUS * np.sin(a)) for a in np.pi / 3 * np.array([1, 3, 5])]
+SIZES = {"convex": f"vertices: {[[float(x), float(y), z] for x, y in _RIM for z in (-0.03, 0.03)]}"}
+"""Of a prism whose three sides touch the cylinder where fingers do."""
+
 _TASK = """
 name: carried
-object: {{mass: 0.1, shapes: [{{{shape}: {{start: [0, 0, -0.03], end: [0, 0, 0.03], radius: 0.02}}}}]}}
+object: {{mass: 0.1, shapes: [{{{shape}: {{{sizes}}}}}]}}
 palm: {{radius: 0.05, position: [0, 0, 0.2], facing: [0, 0, 1], moves: true}}
 motion:
 {goals}
@@ -298,7 +324,8 @@ def carried(
     Args:
         directory: for the task's file.
         more: sections of the task beside those of `_TASK`.
-        shape: of the object, ``capsule`` or ``cylinder``; contacts are on the side that both have.
+        shape: of the object, ``capsule`` or ``cylinder``, or ``convex``, a prism about them; contacts are on the side
+            that all have.
         hard: whether fingertips are points, without moments.
         bent: whether links are bent at zero angle; they stand where straight ones do.
         hinge: from a joint to where its link's body begins, m; 0 where neighbours share a ball.
@@ -307,7 +334,8 @@ def carried(
     time, ends = np.linspace(0.0, 2.0, 21), [[0, 0, 0.28]] * 2
     places = [c.tolist() for c in CONTACTS]
     goals = _goals([0, 2], ends, [[1, 0, 0, 0]] * 2)
-    given = {"shape": shape, "fingertip": fingertip, "hinge": hinge}
+    sizes = SIZES.get(shape, "start: [0, 0, -0.03], end: [0, 0, 0.03], radius: 0.02")
+    given = {"shape": shape, "sizes": sizes, "fingertip": fingertip, "hinge": hinge}
     task = read_task(directory, _TASK.format(*places, goals=goals, **given))
     moments = np.zeros((len(time), 3, 3)) if hard else _moments(time)
     forces, position, quaternion = _carrying(task, moments)

@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.verify.bodies import Body, body_distance
+from casadi_hands.verify.flat import Box, Convex
 from casadi_hands.verify.reading.robot import read_robot
 from casadi_hands.verify.shapes import Capsule, Cylinder, HalfSpace, Shape
 
@@ -24,12 +25,15 @@ SIDES = [
     CYLINDER.format(x, y, turn)
     for x, y, turn in ((0.05, 0, ALONG_X), (0.1, 0.05, ALONG_Y), (0.05, 0.1, ALONG_X), (0, 0.05, ALONG_Y))
 ]
+TURN = Rotation.from_rotvec([0.3, -0.6, 1.1]).as_matrix()
 START, END = np.array([0.01, -0.02, 0.03]), np.array([0.04, 0.02, 0.05])
 SHAPES: dict[str, Shape] = {
     "sphere": Capsule(START, START, 0.02),
     "capsule": Capsule(START, END, 0.02),
     "cylinder": Cylinder(START, END, 0.02),
     "disc": Cylinder(START, START + 0.1 * (END - START), 0.05),
+    "box": Box(np.array([0.05, 0.03, 0.08]), (START + END) / 2, TURN),
+    "wedge": Convex(np.array([[0, 0, 0], [0.06, 0, 0], [0, 0.05, 0], [0, 0, 0.07], [0.06, 0, 0.07]]) @ TURN.T + START),
 }
 STATION = Cylinder(np.array([0, 0, -0.03]), np.array([0, 0, 0.03]), 0.02)
 """Upright, to be measured by hand."""
@@ -119,6 +123,15 @@ def test_boxes_are_the_largest_of_many_surface_points(shape: Shape) -> None:
 def test_what_is_the_same_agrees_either_way_around(shape: Shape) -> None:
     for name, other in SHAPES.items():
         assert other.agrees(shape) == (other is shape), name
+    if isinstance(shape, Box):
+        assert Box(shape.sides[[1, 0, 2]], shape.center, shape.turn[:, [1, 0, 2]]).agrees(shape)
+        assert not Box(shape.sides * [1, 1, 1.00001], shape.center, shape.turn).agrees(shape)
+        return
+    if isinstance(shape, Convex):
+        beside = shape.points + np.array([0, 0, 1e-6])
+        assert Convex(shape.points[::-1]).agrees(shape)
+        assert not Convex(beside).agrees(shape)
+        return
     turned = type(shape)(shape.end, shape.start, shape.radius)  # type: ignore[attr-defined,call-arg]
     assert turned.agrees(shape)
     assert not type(shape)(shape.end, shape.start, 1.00001 * shape.radius).agrees(shape)  # type: ignore[attr-defined,call-arg]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
@@ -21,6 +22,7 @@ class Shape:
         length: of a cylinder, m, along its z axis; None for a sphere.
         color: RGB in 0..1, as exported.
         sides: (3,) of a box, m; None for others.
+        mesh: vertices (V, 3), m, and triangles (T, 3) of them of what is convex; None for others.
     """
 
     link: str
@@ -29,6 +31,13 @@ class Shape:
     length: float | None
     color: tuple[float, float, float]
     sides: tuple[float, float, float] | None = None
+    mesh: tuple[np.ndarray, np.ndarray] | None = None
+
+    def shrunk(self, share: float) -> Shape:
+        """The same about its middle, a share as thick; a cylinder as long."""
+        sides = self.sides and (share * self.sides[0], share * self.sides[1], share * self.sides[2])
+        mesh = None if self.mesh is None else (share * self.mesh[0], self.mesh[1])
+        return replace(self, radius=share * self.radius, sides=sides, mesh=mesh)
 
     @property
     def reach(self) -> float:
@@ -41,20 +50,22 @@ class Robot:
 
     Args:
         urdf: the text as exported.
+        meshes: what the files that it names hold, by their names in it: vertices (V, 3), m, and triangles (T, 3).
 
     Attributes:
         parents: each link's parent link, parents first; the root's is None.
         shapes: the visual primitives of all links.
     """
 
-    def __init__(self, urdf: str) -> None:
+    def __init__(self, urdf: str, meshes: Mapping[str, tuple[np.ndarray, np.ndarray]] | None = None) -> None:
         """Parse the text."""
+        urdf, drawn = _without_meshes(urdf, meshes or {})
         self._model = pin.buildModelFromXML(urdf)
         self._data = self._model.createData()
         self._frames = [(k, frame) for k, frame in enumerate(self._model.frames) if frame.type == pin.FrameType.BODY]
         self.parents = {frame.name: self._parent(frame) for _, frame in self._frames}
         visuals = pin.buildGeomFromUrdfString(self._model, urdf, pin.GeometryType.VISUAL)
-        self.shapes = tuple(self._shape(item) for item in visuals.geometryObjects)
+        self.shapes = (*(self._shape(item) for item in visuals.geometryObjects), *drawn)
 
     def link_poses(self, angles: Mapping[str, float]) -> dict[str, np.ndarray]:
         """Pose (4, 4) of every link in the root link's frame.
@@ -89,3 +100,23 @@ class Robot:
         half_length = getattr(item.geometry, "halfLength", None)
         length = None if half_length is None else 2 * float(half_length)
         return Shape(str(frame.name), placement, float(item.geometry.radius), length, (red, green, blue))
+
+
+def _without_meshes(urdf: str, meshes: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> tuple[str, list[Shape]]:
+    """A text without the visuals that name files, which Pinocchio would look for, and what they draw."""
+    root, drawn = ElementTree.fromstring(urdf), []
+    for link in root.findall("link"):
+        for visual in link.findall("visual"):
+            mesh, color = visual.find("geometry/mesh"), visual.find("material/color")
+            if mesh is None or color is None:
+                continue
+            link.remove(visual)
+            vertices, triangles = meshes[mesh.get("filename", "")]
+            middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+            placement = np.eye(4)
+            placement[:3, 3] = middle
+            red, green, blue = (float(part) for part in color.get("rgba", "").split()[:3])
+            reach = float(np.linalg.norm(vertices - middle, axis=1).max())
+            shape = Shape(link.get("name", ""), placement, reach, None, (red, green, blue))
+            drawn.append(replace(shape, mesh=(vertices - middle, triangles)))
+    return (ElementTree.tostring(root, encoding="unicode"), drawn) if drawn else (urdf, [])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,12 +17,22 @@ from meshcat.geometry import (
     MeshPhongMaterial,
     PointsGeometry,
     Sphere,
+    TriangularMeshGeometry,
 )
 
 from casadi_hands.export.markup import GROUND_COLOR, finger_color
+from casadi_hands.export.meshes import mesh_path, polytopes
 from casadi_hands.export.page.recorder import recording
 from casadi_hands.export.page.robot import Robot, Shape
-from casadi_hands.export.page.shapes import Color, FineSphere, LayeredMesh, patched_cylinder, patched_sphere
+from casadi_hands.export.page.shapes import (
+    Color,
+    FineSphere,
+    LayeredMesh,
+    faceted,
+    patched_box,
+    patched_cylinder,
+    patched_sphere,
+)
 from casadi_hands.export.page.timeline import Timeline, design_timeline, goal_poses, poses
 from casadi_hands.export.page.tracks import Tracks
 from casadi_hands.export.urdf import hand_urdf, object_urdf
@@ -41,6 +51,7 @@ _LONGEST_ARROW = 0.45
 _HEAD = 0.07
 _SHAFT_RADIUS = 0.012
 _MARKER = 0.02
+_THINNER = 0.985  # share of its size that a goal's ghost is drawn with
 
 
 @dataclass(frozen=True)
@@ -69,7 +80,8 @@ def draw_scene(design: Result) -> Scene:
         design: whole or partial; without a hand the bare palm is drawn, without a motion the start.
     """
     task = design.task
-    hand, item = Robot(hand_urdf(design.hand or _bare_palm(design))), Robot(object_urdf(task))
+    meshes = {mesh_path(name): (solid.vertices, solid.triangles) for name, solid in polytopes(task).items()}
+    hand, item = Robot(hand_urdf(design.hand or _bare_palm(design))), Robot(object_urdf(task), meshes)
     timeline = design_timeline(design, hand)
     middle, radius = _bounds(timeline, hand, item, goal_poses(task))
     visualizer, recorder = recording()
@@ -115,7 +127,11 @@ def _draw_object(node: Any, item: Robot) -> None:
     for k, shape in enumerate(item.shapes):
         pale: Color = tuple(0.25 * part + 0.75 for part in shape.color)  # type: ignore[assignment]
         tones = (shape.color, pale)
-        if shape.length is None:
+        if shape.mesh is not None:
+            mesh = faceted(*shape.mesh, tones)
+        elif shape.sides is not None:
+            mesh = patched_box(shape.sides, tones)
+        elif shape.length is None:
             mesh = patched_sphere(shape.radius, tones)
         else:
             mesh = patched_cylinder(shape.radius, shape.length, tones)
@@ -138,7 +154,7 @@ def _draw_goals(node: Any, design: Result, item: Robot, radius: float) -> None:
             goal.set_transform(pose)
             for k, shape in enumerate(item.shapes):
                 # A little thinner, so that an object at its goal hides the ghost instead of mixing with it.
-                shape = replace(shape, radius=0.985 * shape.radius)
+                shape = shape.shrunk(_THINNER)
                 _draw_shape(goal[f"shape{k}"]["depth"], shape, depth, layer=1)
                 _draw_shape(goal[f"shape{k}"]["color"], shape, ghost, layer=2)
             drawn.append(pose)
@@ -200,7 +216,10 @@ def _draw_arrow(node: Any, color: Color, radius: float) -> None:
 
 def _draw_shape(node: Any, shape: Shape, material: Any, layer: int = 0) -> None:
     """Draw a primitive where its link carries it."""
-    if shape.sides is not None:
+    if shape.mesh is not None:
+        node.set_object(LayeredMesh(TriangularMeshGeometry(*shape.mesh), material, layer))
+        node.set_transform(shape.placement)
+    elif shape.sides is not None:
         node.set_object(LayeredMesh(Box(shape.sides), material, layer))
         node.set_transform(shape.placement)
     elif shape.length is None:

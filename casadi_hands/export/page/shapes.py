@@ -95,6 +95,56 @@ def patched_cylinder(radius: float, length: float, tones: tuple[Color, Color]) -
     return PatchedMesh(patches, colors)
 
 
+def patched_box(sides: tuple[float, float, float], tones: tuple[Color, Color]) -> PatchedMesh:
+    """A box about the origin, each face in four quarters that alternate in colour, across its edges too."""
+    patches, colors = [], []
+    half = np.asarray(sides) / 2
+    for axis in range(3):
+        one, other = (axis + 1) % 3, (axis + 2) % 3
+        for sign in (1.0, -1.0):
+            for first in (1.0, -1.0):
+                for second in (1.0, -1.0):
+                    # From the middle outwards or inwards so that it is seen from outside.
+                    outwards = first * second * sign > 0
+                    a, b = _grid((0.0, first * half[one]), (0.0, second * half[other]))
+                    points, normals = np.zeros((3, *a.shape)), np.zeros((3, *a.shape))
+                    points[axis], points[one], points[other], normals[axis] = sign * half[axis], a, b, sign
+                    if not outwards:
+                        points = points.transpose(0, 2, 1)
+                    patches.append((points, normals))
+                    colors.append(tones[int(outwards)])
+    return PatchedMesh(patches, colors)
+
+
+def faceted(vertices: np.ndarray, triangles: np.ndarray, tones: tuple[Color, Color]) -> TriangularMeshGeometry:
+    """A mesh of flat triangles, those of one octant about the origin in one colour.
+
+    Args:
+        vertices: (V, 3).
+        triangles: (T, 3) of them, counterclockwise seen from outside.
+        tones: RGB in 0..1.
+    """
+    corners = vertices[triangles]
+    odd = np.prod(np.where(corners.mean(axis=1) < 0, -1, 1), axis=1) > 0
+    color = np.repeat(np.where(odd[:, None], tones[0], tones[1]), 3, axis=0)
+    faces = np.arange(3 * len(triangles)).reshape(-1, 3)
+    return FacetedMesh(corners.reshape(-1, 3), faces, color)
+
+
+class FacetedMesh(TriangularMeshGeometry):  # type: ignore[misc]
+    """Triangles that share no corner, each with its own normal."""
+
+    def lower(self, object_data: dict[str, Any]) -> dict[str, Any]:
+        """The geometry as three.js reads it."""
+        data: dict[str, Any] = super().lower(object_data)
+        corners = np.asarray(self.vertices).reshape(-1, 3, 3)
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+        packed = np.repeat(normals, 3, axis=0).astype(np.float32)
+        data["data"]["attributes"]["normal"] = pack_numpy_array(packed.T)
+        return data
+
+
 def _octants() -> list[tuple[tuple[float, float], int]]:
     """Azimuth range (rad) and half (0 upper, 1 lower) of the eight patches, the four upper first."""
     quarters = [(k * np.pi / 2, (k + 1) * np.pi / 2) for k in range(4)]

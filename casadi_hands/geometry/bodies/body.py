@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
-from typing import Any, ClassVar, Literal, Self
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
@@ -26,16 +26,24 @@ class Solid:
     """A primitive that URDF, MJCF and the page know.
 
     Attributes:
-        kind: ``sphere``, ``cylinder`` or ``capsule``.
-        start: (3,) one end of its axis, body frame; a sphere's centre.
+        kind: ``sphere``, ``cylinder``, ``capsule``, ``box`` or ``convex``.
+        start: (3,) one end of its axis, body frame; the centre of a sphere or box.
         end: (3,) the other end.
-        radius: of it.
+        radius: of it; of a box or what is convex 0.
+        size: (3,) of a box, its sides.
+        turn: (3, 3) of a box, its axes by columns.
+        vertices: (V, 3) of what is convex, body frame.
+        triangles: (T, 3) of their numbers, counterclockwise seen from outside.
     """
 
-    kind: Literal["sphere", "cylinder", "capsule"]
+    kind: Literal["sphere", "cylinder", "capsule", "box", "convex"]
     start: Array
     end: Array
-    radius: float
+    radius: float = 0.0
+    size: Array = field(default_factory=lambda: np.zeros(3))
+    turn: Array = field(default_factory=lambda: np.eye(3))
+    vertices: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    triangles: NDArray[np.int_] = field(default_factory=lambda: np.zeros((0, 3), int))
 
 
 class Core(ABC):
@@ -72,9 +80,9 @@ class Core(ABC):
         distance = norm(offset, rounding)
         return distance - self.depth(point), offset / distance
 
-    def slope(self, point: SX, along: SX) -> SX:
-        """Something of the sign that the change of the distance has at a point (3,) that moves along a vector (3,)."""
-        return ca.dot(self.offset(point), along)
+    def slopes(self, start: SX, along: SX) -> Callable[[SX], SX]:
+        """What of a share of a vector (3,) from a point (3,) has the sign of the distance's change there."""
+        return lambda share: ca.dot(self.offset(start + share * along), along)
 
 
 @dataclass(frozen=True)
@@ -121,10 +129,15 @@ class Body(ABC):
     def parameters(self) -> Array:
         """(width,) all that it is, as a kernel's parameters."""
 
-    @classmethod
-    @abstractmethod
-    def of(cls, parameters: Array) -> Self:
-        """The body of some parameters (width,)."""
+    def measured(self, change: Callable[[Array], Array]) -> Body:
+        """The body whose lengths are what a function, which takes arrays of them, makes of its own."""
+        made = {}
+        for each in fields(self):
+            value = getattr(self, each.name)
+            if each.metadata["is"] != "rotation":
+                value = change(np.asarray(value, float))
+            made[each.name] = float(value) if each.metadata["is"] == "positive" else value
+        return replace(self, **made)
 
     @classmethod
     @abstractmethod
@@ -159,7 +172,7 @@ class Body(ABC):
         """Inertia (3, 3) of the solid with a mass of one about its centroid."""
 
     @abstractmethod
-    def placed(self, rotation: Array, position: Array) -> Self:
+    def placed(self, rotation: Array, position: Array) -> Body:
         """The same body turned by a rotation (3, 3), then shifted by (3,)."""
 
     @abstractmethod

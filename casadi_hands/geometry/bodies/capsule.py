@@ -70,11 +70,6 @@ class Capsule(Body):
         return np.array([*self.start, *self.end, self.radius])
 
     @classmethod
-    def of(cls, parameters: Array) -> Self:
-        """See `Body`."""
-        return cls(parameters[:3], parameters[3:6], float(parameters[6]))
-
-    @classmethod
     def surface(cls, parameters: SX) -> Surface:
         """See `Body`."""
         return Surface(Segment(parameters[:3], parameters[3:6]), parameters[6])

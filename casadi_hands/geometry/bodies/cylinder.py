@@ -108,11 +108,6 @@ class Cylinder(Body):
         return np.array([*self.start, *self.end, self.radius, self.edge_radius])
 
     @classmethod
-    def of(cls, parameters: Array) -> Self:
-        """See `Body`."""
-        return cls(parameters[:3], parameters[3:6], float(parameters[6]), float(parameters[7]))
-
-    @classmethod
     def surface(cls, parameters: SX) -> Surface:
         """See `Body`."""
         start, end, edge = parameters[:3], parameters[3:6], parameters[7]

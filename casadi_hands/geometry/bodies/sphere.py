@@ -55,11 +55,6 @@ class Sphere(Body):
         return np.append(self.center, self.radius)
 
     @classmethod
-    def of(cls, parameters: Array) -> Self:
-        """See `Body`."""
-        return cls(parameters[:3], float(parameters[3]))
-
-    @classmethod
     def surface(cls, parameters: SX) -> Surface:
         """See `Body`."""
         return Surface(Point(parameters[:3]), parameters[3])

@@ -9,9 +9,10 @@ from scipy.spatial.transform import Rotation
 
 from casadi_hands.verify.bodies import Body, swept_inertial
 from casadi_hands.verify.checks.servos import put_together
+from casadi_hands.verify.forms import FORMS
 from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.reading.stored import as_array, entry, same
-from casadi_hands.verify.shapes import FORMS, Capsule, Cylinder, Shape
+from casadi_hands.verify.shapes import Capsule, Cylinder, Shape
 
 STATUSES = ("certified", "feasible", "failed")
 
@@ -55,13 +56,7 @@ def _shape_problems(folder: Folder) -> list[str]:
 def _shape(kind: Any, numbers: Any) -> Shape | None:
     """Return what a kind and its numbers state, or None where they state no shape that is measured."""
     form = FORMS.get(kind) if isinstance(kind, str) else None
-    if form is None:
-        return None
-    points = [at for name in form.points if (at := as_array(entry(numbers, name), (3,))) is not None]
-    sizes = [float(size) for name in form.sizes if (size := as_array(entry(numbers, name), ())) is not None]
-    if (len(points), len(sizes)) != (len(form.points), len(form.sizes)):
-        return None
-    return form.shape.stated(points, sizes)
+    return None if form is None else form.read(numbers)
 
 
 def _is_stated(item: Any, kind: str, numbers: dict[str, Any]) -> bool:
@@ -69,7 +64,7 @@ def _is_stated(item: Any, kind: str, numbers: dict[str, Any]) -> bool:
     stated, due = _shape(entry(item, "type"), item), _shape(kind, numbers)
     if stated is None or due is None or not due.agrees(stated):
         return False
-    return all(same(entry(item, name), numbers[name]) for name in FORMS[kind].sizes)
+    return all(same(entry(item, name), numbers[name]) for name in FORMS[kind].lengths)
 
 
 def record_problems(folder: Folder) -> list[str]:

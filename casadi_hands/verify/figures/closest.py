@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from casadi_hands.verify.flat import Flat
 from casadi_hands.verify.shapes import Capsule, Cylinder, Shape
 
 LEVEL = 1e-3
@@ -51,7 +52,7 @@ def closest_to_capsule(
 
 
 def lowest_points(shape: Shape, up: np.ndarray, planned: np.ndarray) -> np.ndarray:
-    """Return the points (N, 3) of a capsule or a cylinder that are lowest, m, its frame.
+    """Return the points (N, 3) of a shape that are lowest, m, its frame.
 
     Where a whole line or face is lowest, it is where the plan has it.
 
@@ -63,6 +64,8 @@ def lowest_points(shape: Shape, up: np.ndarray, planned: np.ndarray) -> np.ndarr
     Raises:
         NotImplementedError: the shape is another.
     """
+    if isinstance(shape, Flat):
+        return np.array([_lowest_of(shape, *each) for each in zip(up, planned, strict=True)])
     start, axis = _axis(shape)
     length = float(np.linalg.norm(axis))
     unit = axis / max(length, 1e-300)
@@ -78,13 +81,43 @@ def lowest_points(shape: Shape, up: np.ndarray, planned: np.ndarray) -> np.ndarr
     return np.where(size < LEVEL, planned, rim)
 
 
+def _lowest_of(shape: Flat, up: np.ndarray, planned: np.ndarray) -> np.ndarray:
+    """Return the lowest point (3,) of a shape with corners."""
+    corners = _level_corners(shape, up)
+    if len(corners) == 1:
+        return np.asarray(corners[0])
+    if len(corners) == 2:
+        along = corners[1] - corners[0]
+        return np.asarray(corners[0] + np.clip((planned - corners[0]) @ along / (along @ along), 0.0, 1.0) * along)
+    return planned
+
+
+def _level_corners(shape: Flat, up: np.ndarray) -> np.ndarray:
+    """Return the corners (n, 3) of a shape that are on the ground with its lowest."""
+    heights = shape.corners @ up
+    return np.asarray(shape.corners[heights <= heights.min() + LEVEL * shape.size])
+
+
 def level_directions(shape: Shape, up: np.ndarray) -> np.ndarray:
     """Return the directions (n, 3), shape's frame, about which it cannot tip where it stands on a line or a face.
 
     Args:
-        shape: a capsule or a cylinder.
+        shape: in its own frame.
         up: (3,) unit, its frame.
+
+    Raises:
+        NotImplementedError: the shape is another.
     """
+    if isinstance(shape, Flat):
+        corners = _level_corners(shape, up)
+        arms = corners - corners[0]
+        rank = np.linalg.matrix_rank(arms, tol=LEVEL * shape.size)
+        if rank > 1:
+            both: np.ndarray = np.linalg.svd(up[None])[2][1:]
+            return both
+        longest = arms[np.argmax(np.linalg.norm(arms, axis=1))]
+        line = np.cross(longest, up)[None] / max(float(np.linalg.norm(longest)), 1e-300)
+        return line if rank else np.zeros((0, 3))
     axis = _axis(shape)[1]
     length = float(np.linalg.norm(axis))
     if length == 0.0:

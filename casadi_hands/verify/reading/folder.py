@@ -16,11 +16,11 @@ from casadi_hands.errors import DesignError
 from casadi_hands.problem.motion import Motion
 from casadi_hands.task import Task, load_task
 from casadi_hands.verify.bodies import Body, ground_body
+from casadi_hands.verify.forms import FORMS
 from casadi_hands.verify.reading.drive import Drive, read_drive
 from casadi_hands.verify.reading.robot import Joint, Robot, read_robot
 from casadi_hands.verify.reading.scene_file import Scene, read_scene
 from casadi_hands.verify.reading.stored import entry, read_motion, read_record
-from casadi_hands.verify.shapes import FORMS
 
 STANDARD_GRAVITY = 9.81
 """m/s²; scales forces when the task has no gravity."""
@@ -203,8 +203,8 @@ def _object(path: Path, robot: Robot) -> Body:
         raise DesignError(f"{path}: holds {found or 'no link'}; it must hold one link 'object' and nothing else")
     body = robot.links["object"]
     if not body.shapes or not {type(shape) for shape in body.shapes} <= {form.shape for form in FORMS.values()}:
-        *kinds, last = (f"{kind}s" for kind in FORMS)
-        raise DesignError(f"{path}: no link 'object' made of {', '.join(kinds)} and {last}")
+        *kinds, last = FORMS
+        raise DesignError(f"{path}: no link 'object' made of shapes of the kinds {', '.join(kinds)} and {last}")
     return body
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -11,8 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from casadi_hands.errors import DesignError
 from casadi_hands.verify.bodies import Body, joined
-from casadi_hands.verify.box import Box
+from casadi_hands.verify.flat import Box, Convex
 from casadi_hands.verify.reading.markup import called, name_of, number, numbers, only, positive, read_xml, strangers
+from casadi_hands.verify.reading.points import read_points
 from casadi_hands.verify.shapes import Capsule, Cylinder, Shape
 
 
@@ -61,13 +62,13 @@ class Robot:
 
 
 def read_robot(path: Path) -> Robot:
-    """Read a URDF of spheres, cylinders and revolute joints; boxes only to be seen are servos, thin cylinders hinges.
+    """Read a URDF of simple shapes and revolute joints; boxes only to be seen are servos, thin cylinders hinges.
 
     A cylinder with a sphere of its radius at either end is read as the capsule they form.
 
     Raises:
         DesignError: the file is missing or is not XML; a name or a property is given twice; a number is missing, is not
-            finite or cannot be; a shape is neither sphere nor cylinder; a joint does not turn.
+            finite or cannot be; a shape is none of those that it knows; a joint does not turn.
     """
     root = read_xml(path, "robot")
     links: dict[str, Body] = {}
@@ -94,7 +95,7 @@ def read_robot(path: Path) -> Robot:
 def _compiler(element: Element) -> list[str]:
     found = list(strangers(element, "compiler", ""))
     for compiler in element.findall("compiler"):
-        found += strangers(compiler, "", "fusestatic discardvisual")
+        found += strangers(compiler, "", "fusestatic discardvisual strippath")
     return found
 
 
@@ -163,27 +164,43 @@ def _placement(path: Path, element: Element) -> np.ndarray:
     return placement
 
 
+@dataclass
+class _Found:
+    """Shapes of a link that collide, or that are seen."""
+
+    spheres: list[Capsule] = field(default_factory=list)
+    cylinders: list[Cylinder] = field(default_factory=list)
+    flat: list[Box | Convex] = field(default_factory=list)
+
+    @property
+    def shapes(self) -> tuple[Shape, ...]:
+        """What they make."""
+        return (*joined(self.spheres, self.cylinders), *self.flat)
+
+    @property
+    def rows(self) -> list[tuple[float, ...]]:
+        """Numbers by which they are compared, in an order of their own."""
+        rows = [np.array([shape.radius, *shape.start, *shape.end]) for shape in (*self.spheres, *self.cylinders)]
+        rows += [shape.corners[np.lexsort(shape.corners.T.round(9))].ravel() for shape in self.flat]
+        return sorted(tuple(np.round(row, 9).tolist()) for row in rows)
+
+
 def _read_link(path: Path, name: str, link: Element) -> tuple[Body, list[str]]:
     strange = list(strangers(link, "inertial visual collision", "name"))
-    found: dict[str, tuple[list[Capsule], list[Cylinder]]] = {}
-    cases: list[Box] = []
-    for role in ("collision", "visual"):
-        spheres: list[Capsule] = []
-        cylinders: list[Cylinder] = []
+    collides, seen = _Found(), _Found()
+    for role, found in (("collision", collides), ("visual", seen)):
         for element in link.findall(role):
             strange += strangers(element, "origin geometry material")
             for color in element.iter("color"):
                 numbers(path, color, "rgba", 4)
-            if role == "visual" and element.find("geometry/box") is not None:
-                cases.append(_read_case(path, name, element))
-                continue
-            _read_shape(path, name, element, spheres, cylinders)
-        found[role] = spheres, cylinders
-    spheres, cylinders = found["visual"]
-    seen = spheres, [cylinder for cylinder in cylinders if not _in_hinge(cylinder, joined(*found["collision"]))]
-    if _rows(*found["collision"]) != _rows(*seen):
+            _read_shape(path, name, element, found)
+    seen.cylinders = [cylinder for cylinder in seen.cylinders if not _in_hinge(cylinder, collides.shapes)]
+    # Boxes that are only seen are servos.
+    cases = [each for each in seen.flat if isinstance(each, Box) and not any(each.agrees(o) for o in collides.flat)]
+    seen.flat = [each for each in seen.flat if not any(each is case for case in cases)]
+    if collides.rows != seen.rows:
         strange.append(f"link {name} looks other than it collides: its visual geometry is not its collision geometry")
-    return Body(name, *_inertial(path, name, link), joined(*found["collision"]), tuple(cases)), strange
+    return Body(name, *_inertial(path, name, link), collides.shapes, tuple(cases)), strange
 
 
 def _in_hinge(cylinder: Cylinder, body: tuple[Shape, ...]) -> bool:
@@ -195,34 +212,26 @@ def _in_hinge(cylinder: Cylinder, body: tuple[Shape, ...]) -> bool:
     return all(float(np.linalg.norm(end)) <= length for end in (cylinder.start, cylinder.end))
 
 
-def _read_case(path: Path, name: str, element: Element) -> Box:
-    placement, geometry = _placement(path, element), only(path, element, "geometry")
-    if geometry is None or len(geometry) != 1:
-        raise DesignError(f"{path}: link {name}: its visual geometry is not one shape")
-    sides = numbers(path, geometry[0], "size", 3)
-    if sides.min() <= 0.0:
-        raise DesignError(f"{path}: link {name}: a side of its box is {sides.min():g} m, not above zero")
-    return Box(sides, placement[:3, 3], placement[:3, :3])
-
-
-def _read_shape(path: Path, name: str, element: Element, spheres: list[Capsule], cylinders: list[Cylinder]) -> None:
+def _read_shape(path: Path, name: str, element: Element, found: _Found) -> None:
     placement, geometry = _placement(path, element), only(path, element, "geometry")
     shape = geometry[0] if geometry is not None and len(geometry) == 1 else None
     if shape is None:
         raise DesignError(f"{path}: link {name}: its {element.tag} geometry is not one shape")
+    turn, at = placement[:3, :3], placement[:3, 3]
     if shape.tag == "sphere":
-        spheres.append(Capsule(placement[:3, 3], placement[:3, 3], positive(path, shape, "radius")))
+        found.spheres.append(Capsule(at, at, positive(path, shape, "radius")))
     elif shape.tag == "cylinder":
-        radius, reach = positive(path, shape, "radius"), 0.5 * positive(path, shape, "length") * placement[:3, 2]
-        cylinders.append(Cylinder(placement[:3, 3] - reach, placement[:3, 3] + reach, radius))
+        radius, reach = positive(path, shape, "radius"), 0.5 * positive(path, shape, "length") * turn[:, 2]
+        found.cylinders.append(Cylinder(at - reach, at + reach, radius))
+    elif shape.tag == "box":
+        sides = numbers(path, shape, "size", 3)
+        if sides.min() <= 0.0:
+            raise DesignError(f"{path}: link {name}: a side of its box is {sides.min():g} m, not above zero")
+        found.flat.append(Box(sides, at, turn))
+    elif shape.tag == "mesh":
+        found.flat.append(Convex(read_points(path, shape.get("filename", "")) @ turn.T + at))
     else:
-        raise DesignError(f"{path}: link {name}: its {element.tag} geometry is neither sphere nor cylinder")
-
-
-def _rows(spheres: list[Capsule], cylinders: list[Cylinder]) -> list[tuple[float, ...]]:
-    """Return numbers by which shapes are compared, in an order of their own."""
-    rows = [np.array([shape.radius, *shape.start, *shape.end]) for shape in (*spheres, *cylinders)]
-    return sorted(tuple(np.round(row, 9).tolist()) for row in rows)
+        raise DesignError(f"{path}: link {name}: its {element.tag} geometry is neither sphere, cylinder, box nor mesh")
 
 
 def _inertial(path: Path, name: str, link: Element) -> tuple[float, np.ndarray, np.ndarray]:

@@ -9,33 +9,14 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from casadi_hands.errors import DesignError
+from casadi_hands.verify.flat import Convex
+from casadi_hands.verify.reading.geoms import Geom, read_geom, read_looks
 from casadi_hands.verify.reading.markup import called, name_of, number, numbers, only, positive, read_xml, strangers
-from casadi_hands.verify.shapes import Capsule, Cylinder, Shape
+from casadi_hands.verify.reading.points import hull_points
 
 _SECTIONS = "compiler option statistic default worldbody contact equality tendon actuator keyframe visual asset"
 _OPTIONS = "timestep gravity integrator cone impratio noslip_iterations iterations tolerance solver"
-_GEOM = "name type pos fromto size friction condim priority solref solimp rgba"
 _KEY = ("time", "qpos", "ctrl", "mpos", "mquat")
-_FRICTION = "1 0.005 0.0001"
-
-
-@dataclass(frozen=True)
-class Geom:
-    """A solid of a body.
-
-    Attributes:
-        kind: ``sphere``, ``capsule``, ``cylinder`` or ``plane``.
-        place: (3,) m, where the file puts it, body frame; of a plane, a point of it.
-        shape: what it is; None of a plane, or of what the format does not have.
-        friction: (3,) sliding, torsional (m) and rolling (m).
-        priority: whose friction holds where two touch.
-    """
-
-    kind: str
-    place: np.ndarray
-    shape: Shape | None
-    friction: np.ndarray
-    priority: float
 
 
 @dataclass(frozen=True)
@@ -121,6 +102,7 @@ class Scene:
         servos: in the file's order, which is that of MuJoCo's controls.
         springs: in the file's order.
         keys: name -> attribute -> its numbers.
+        meshes: polytopes by name.
         strange: what the format does not have, a sentence each.
     """
 
@@ -133,6 +115,7 @@ class Scene:
     servos: list[Servo] = field(default_factory=list)
     springs: list[Spring] = field(default_factory=list)
     keys: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)
+    meshes: dict[str, Convex] = field(default_factory=dict)
     strange: list[str] = field(default_factory=list)
 
 
@@ -156,7 +139,7 @@ def read_scene(path: Path) -> Scene:
     scene = Scene(number(path, option, "timestep", "0.002"), numbers(path, option, "gravity", 3, "0 0 -9.81"))
     scene.strange.extend(strangers(root, _SECTIONS, "model"))
     allowed = {"compiler": ("", "angle"), "option": ("", _OPTIONS), "default": ("geom", ""), "contact": ("exclude", "")}
-    allowed |= {"tendon": ("fixed", "")}
+    allowed |= {"tendon": ("fixed", ""), "asset": ("mesh", "")}
     allowed |= {"equality": ("weld", ""), "actuator": ("position", ""), "keyframe": ("key", "")}
     for tag, (tags, attributes) in allowed.items():
         if (element := section[tag]) is not None:
@@ -174,7 +157,7 @@ def _read_entry(path: Path, scene: Scene, element: Element) -> None:
     odd = scene.strange
     if element.tag == "geom":
         odd += strangers(element, "", "condim solref solimp")
-        _read_looks(path, element)
+        read_looks(path, element)
     elif element.tag == "exclude":
         scene.excluded.append(frozenset((element.get("body1", ""), element.get("body2", ""))))
         odd += strangers(element, "", "name body1 body2")
@@ -188,6 +171,10 @@ def _read_entry(path: Path, scene: Scene, element: Element) -> None:
         odd += strangers(element, "", "name joint kp kv forcelimited forcerange")
         if element.get("forcelimited") != "true":
             odd.append(f"{called(element)} limits no torque: forcelimited is not true")
+    elif element.tag == "mesh":
+        odd += strangers(element, "", "name vertex")
+        name, words = name_of(path, element, scene.meshes), element.get("vertex", "").split()
+        scene.meshes[name] = Convex(hull_points(path, numbers(path, element, "vertex", len(words))))
     elif element.tag == "fixed":
         scene.springs.append(_read_spring(path, scene, element))
     elif element.tag == "key":
@@ -212,7 +199,9 @@ def _read_spring(path: Path, scene: Scene, element: Element) -> Spring:
 
 def _read_body(path: Path, scene: Scene, element: Element, name: str) -> None:
     """Read what is on a body, and the bodies on it, in MuJoCo's order."""
-    geoms = tuple(_read_geom(path, scene, geom) for geom in element.findall("geom"))
+    read = [read_geom(path, scene.meshes, geom) for geom in element.findall("geom")]
+    geoms = tuple(geom for geom, _ in read)
+    scene.strange.extend(what for _, strange in read for what in strange)
     if name == "world":
         scene.strange.extend(strangers(element, "body geom light camera"))
         scene.planes.extend(geoms)
@@ -249,13 +238,6 @@ def _on(body: SceneBody, parent: str) -> SceneBody:
     return SceneBody(**{**vars(body), "parent": parent})
 
 
-def _read_looks(path: Path, element: Element) -> None:
-    """Read what of a solid is compared with nothing, so that it is numbers."""
-    for name, count in (("rgba", 4), ("solref", 2), ("solimp", 3), ("condim", 1)):
-        if element.get(name) is not None:
-            numbers(path, element, name, count)
-
-
 def _read_hinge(path: Path, scene: Scene, element: Element) -> Hinge:
     scene.strange.extend(strangers(element, "", "name axis ref limited range armature"))
     name, armature = element.get("name", ""), number(path, element, "armature", "0")
@@ -265,24 +247,3 @@ def _read_hinge(path: Path, scene: Scene, element: Element) -> Hinge:
     if element.get("limited") != "true":
         scene.strange.append(f"{called(element)} has no limits: limited is not true")
     return Hinge(name, axis, reference, numbers(path, element, "range", 2), armature)
-
-
-def _read_geom(path: Path, scene: Scene, element: Element) -> Geom:
-    scene.strange.extend(strangers(element, "", _GEOM))
-    kind = element.get("type", "sphere")
-    place = numbers(path, element, "pos", 3, "0 0 0")
-    shape: Shape | None = None
-    if kind == "sphere":
-        shape = Capsule(place, place, positive(path, element, "size"))
-    elif kind == "capsule" or (kind == "cylinder" and element.get("fromto") is not None):
-        ends = numbers(path, element, "fromto", 6)
-        shape = (Capsule if kind == "capsule" else Cylinder)(ends[:3], ends[3:], positive(path, element, "size"))
-    elif kind == "cylinder":
-        radius, half = numbers(path, element, "size", 2)
-        reach = np.array([0.0, 0.0, half])
-        shape = Cylinder(place - reach, place + reach, float(radius))
-    elif kind != "plane":
-        scene.strange.append(f"{called(element)} is a {kind}, which the format does not have")
-    _read_looks(path, element)
-    friction = numbers(path, element, "friction", 3, _FRICTION)
-    return Geom(kind, place, shape, friction, number(path, element, "priority", "0"))

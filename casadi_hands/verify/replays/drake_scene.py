@@ -155,7 +155,7 @@ class Shapes:
         tips = [shape.radius for name, body in folder.links.items() if name != "palm" for shape in body.capsules]
         thin = min(shape.radius for shape in folder.object.shapes)
         tip = max(tips, default=thin)
-        relative = tip * thin / (tip + thin)
+        relative = tip * thin / (tip + thin) if np.isfinite(thin) else tip
         self._depth = (PATCH * tip) ** 2 / (2 * relative)
         self._gradient = PRESS * folder.weight / (np.pi * relative * self._depth**2)
         self._mu = factor * folder.task.friction

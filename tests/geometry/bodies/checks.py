@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.geometry.bodies import Body
+from casadi_hands.geometry.bodies.capsule import Segment
+from casadi_hands.geometry.pairs import core_distance
 
 Array = NDArray[np.float64]
 Placed = tuple[object, coal.Transform3s]
@@ -137,7 +139,8 @@ def check_placed(body: Body, rng: np.random.Generator) -> None:
     """Moved rigidly, in numbers and in symbols, it is as far from points that move along; packed, it is the same."""
     turn, shift = Rotation.random(rng=rng).as_matrix(), rng.normal(size=3)
     moved = body.placed(turn, shift)
-    np.testing.assert_allclose(type(body).of(body.parameters).parameters, body.parameters)
+    twice = body.measured(lambda lengths: 2 * lengths).placed(np.eye(3), np.zeros(3))
+    np.testing.assert_allclose(twice.signed_distance(2 * np.ones(3)), 2 * body.signed_distance(np.ones(3)))
     assert len(body.parameters) == body.width
     point, parameters = ca.SX.sym("point", 3), ca.SX.sym("parameters", body.width)
     surface = type(body).surface(parameters).mapped(lambda p: ca.mtimes(ca.SX(turn), p) + ca.SX(shift))
@@ -195,3 +198,38 @@ def revolved(
     along = float(np.pi / 2 * w @ square**2) / volume
     across = float(np.pi * w @ (square**2 / 4 + z**2 * square)) / volume
     return volume, along, across
+
+
+def check_links(
+    body: Body,
+    core: Placed,
+    rng: np.random.Generator,
+    near: float = np.inf,
+    short: float = 2e-3,
+    swept: float = 0.0,
+) -> None:
+    """Distances of links, thin ones, from a body's core are coal's; of those nearer than some distance alone.
+
+    Args:
+        body: of a size of about one.
+        core: as coal has it.
+        rng: where links are.
+        near: beyond it distances may be anything.
+        short: by how much they may be too small within.
+        swept: what coal's body is larger by.
+    """
+    ends, parameters = [ca.SX.sym(name, 3) for name in ("start", "end")], ca.SX.sym("parameters", body.width)
+    surface = type(body).surface(parameters)
+    distance = ca.Function("distance", [*ends, parameters], [core_distance(Segment(*ends), surface.core)])
+    missed = []
+    for start, end in rng.uniform(-2, 2, (400, 2, 3)):
+        length = float(np.linalg.norm(end - start))
+        truth = coal_distance(along_z(coal.Capsule(1e-6, length), start, end), core) + 1e-6
+        found = float(distance(start, end, body.parameters)) - swept
+        if 0 < truth < near:
+            assert found < truth + 0.03
+        if 0.03 < truth < near:
+            missed.append(found - truth)
+    assert len(missed) > 20
+    assert min(missed) > -short
+    assert np.quantile(np.abs(missed), 0.9) < max(2e-3, short)

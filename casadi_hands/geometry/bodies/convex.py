@@ -1,0 +1,298 @@
+"""A polytope: flat faces about all points, its edges rounded by how softly the nearest face is chosen."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property
+from typing import Any, ClassVar
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+from scipy.spatial import QhullError
+
+from casadi_hands.geometry.bodies.body import Array, Body, Core, Solid, Surface
+from casadi_hands.geometry.hull import ALIKE, Hull, crossed, hull_of, within
+from casadi_hands.geometry.smooth import constant, norm
+
+# The surface is where log Σ exp β(n·x - d) vanishes; with this β times its edges' radius, square edges are as far
+# inside those of the faces as round ones of that radius would be.
+_SHARPNESS = float(np.sqrt(2) * np.log(2) / (np.sqrt(2) - 1))
+_LOWEST = 1e-3  # lengths by which corners may be higher than the lowest and count for it
+_STEPS = 1000  # towards the surface; in a sharp wedge they zigzag
+_ROUNDS = 30  # of moving faces until the surface goes through their middles
+
+
+@dataclass(frozen=True)
+class Facets(Core):
+    """What is inside of all faces.
+
+    Attributes:
+        normals: (F, 3) outward, in the frame of the body.
+        reaches: (F, 1) of the faces' planes along them, moved so that the surface goes through the faces' middles.
+        corners: (V, 3) of the core.
+        edge: radius of the rounded edges.
+        origin: (3,) of the body's frame in this one.
+        turn: (3, 3) this frame from the body's.
+    """
+
+    normals: SX
+    reaches: SX
+    corners: SX
+    edge: SX
+    origin: SX
+    turn: SX
+
+    def _weighed(self, beyond: SX) -> tuple[SX, SX, SX]:
+        """Of how far a point is beyond the faces (F, 1): the most, weights (F, 1) of the nearest, and their sum."""
+        most = constant(ca.mmax(beyond))
+        weights = ca.exp(_SHARPNESS / self.edge * (beyond - most))
+        return most, weights, ca.sum1(weights)
+
+    def _beyond(self, point: SX) -> SX:
+        """How far a point (3,) is beyond the faces (F, 1)."""
+        return ca.mtimes(self.normals, ca.mtimes(self.turn.T, point - self.origin)) - self.reaches
+
+    def distance_and_normal(self, point: SX, rounding: float) -> tuple[SX, SX]:
+        """See `Core`; outside, the distance of a plane that is as steep as the nearest faces are together."""
+        most, weights, total = self._weighed(self._beyond(point))
+        beyond = most + ca.log(total) * self.edge / _SHARPNESS
+        mean = ca.mtimes(self.turn, ca.mtimes(self.normals.T, weights) / total)
+        steep = norm(mean, 1e-6)
+        return ca.if_else(beyond > 0, beyond / steep, beyond) + self.edge, mean / steep
+
+    def slopes(self, start: SX, along: SX) -> Callable[[SX], SX]:
+        """See `Core`."""
+        first, change = self._beyond(start), ca.mtimes(self.normals, ca.mtimes(self.turn.T, along))
+
+        def slope(share: SX) -> SX:
+            _, weights, total = self._weighed(first + share * change)
+            return ca.dot(weights, change) / total
+
+        return slope
+
+    def offset(self, point: SX) -> SX:
+        """See `Core`."""
+        distance, normal = self.distance_and_normal(point, 0.0)
+        return distance * normal
+
+    def mapped(self, placed: Callable[[SX], SX]) -> Facets:
+        """See `Core`."""
+        origin = placed(self.origin)
+        axes = [placed(self.origin + self.turn[:, k]) - origin for k in range(3)]
+        return replace(self, origin=origin, turn=ca.horzcat(*axes))
+
+    def marks(self, up: SX) -> list[SX]:
+        """See `Core`: the lowest."""
+        return self.lowest(up)
+
+    def lowest(self, up: SX) -> list[SX]:
+        """See `Core`: a corner; the middle of the corners that are level."""
+        heights = ca.mtimes(self.corners, ca.mtimes(self.turn.T, up))
+        weights = ca.exp((constant(ca.mmin(heights)) - heights) / _LOWEST)
+        return [self.origin + ca.mtimes(self.turn, ca.mtimes(self.corners.T, weights) / ca.sum1(weights))]
+
+
+def _edge(data: Mapping[str, Any]) -> float:
+    """A hundredth of half the least width."""
+    points = np.asarray(data["vertices"], float)
+    try:
+        hull = hull_of(points)
+    except QhullError:
+        return 1.0  # refused below
+    return float((hull.reaches - (hull.corners @ hull.normals.T).min(axis=0)).min()) / 200
+
+
+@dataclass(frozen=True, eq=False)
+class Convex(Body):
+    """The least polytope about some points."""
+
+    kind: ClassVar[str] = "convex"
+    width: ClassVar[int] = 10_000  # of one with as many faces and corners as are allowed
+    counts: ClassVar[tuple[int, int]] = (0, 0)
+    vertices: Array = field(metadata={"about": "Its corners, m, object frame; a list of four or more.", "is": "points"})
+    edge_radius: float = field(
+        metadata={
+            "about": "Radius of square edges, m, as the motion sees them; files have them sharp.",
+            "is": "positive",
+            "default": _edge,
+            "default_text": "a hundredth of half the least width",
+        }
+    )
+
+    def __new__(cls, vertices: Array, edge_radius: float) -> Convex:
+        """A body of as many faces and corners as its points have: a class of its own, since kernels differ by it."""
+        try:
+            hull = hull_of(np.asarray(vertices, float))
+        except (QhullError, ValueError):
+            return object.__new__(cls)
+        core = within(hull, edge_radius) or hull
+        made = object.__new__(_of_counts(len(hull.normals), len(core.corners)))
+        object.__setattr__(made, "_made", (hull, core))
+        return made
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """How it is sent to another process: classes by counts are made there."""
+        return Convex, (self.vertices, self.edge_radius)
+
+    def impossible(self) -> str:
+        """See `Body`."""
+        if not hasattr(self, "_made"):
+            return "four points or more that do not lie in one plane"
+        if within(self._hull, self.edge_radius) is None:
+            return "an edge_radius smaller than half its least width"
+        return ""
+
+    @property
+    def _hull(self) -> Hull:
+        return self._made[0]  # type: ignore[attr-defined,no-any-return]
+
+    @property
+    def _core(self) -> Hull:
+        return self._made[1]  # type: ignore[attr-defined,no-any-return]
+
+    @property
+    def ball(self) -> float:
+        """See `Body`."""
+        return self.edge_radius
+
+    @property
+    def parameters(self) -> Array:
+        """See `Body`: faces' normals and reaches, corners of the core, edge radius."""
+        hull = self._hull
+        return np.concatenate([hull.normals.ravel(), self._reaches, self._core.corners.ravel(), [self.edge_radius]])
+
+    def measured(self, change: Callable[[Array], Array]) -> Convex:
+        """See `Body`."""
+        return Convex(change(np.asarray(self.vertices)), float(change(np.asarray(self.edge_radius))))
+
+    @classmethod
+    def surface(cls, parameters: SX) -> Surface:
+        """See `Body`."""
+        faces, corners = cls.counts
+        ends = np.cumsum([0, 3 * faces, faces, 3 * corners]).tolist()
+        normals, reaches, points = (parameters[a:b] for a, b in itertools.pairwise(ends))
+        rows = [ca.reshape(each, 3, -1).T for each in (normals, points)]
+        edge = parameters[ends[-1]]
+        return Surface(Facets(rows[0], reaches, rows[1], edge, SX.zeros(3, 1), SX.eye(3)), edge)
+
+    @cached_property
+    def _reaches(self) -> Array:
+        """Of the faces, (F,), moved so that the surface goes through their middles."""
+        hull, reaches = self._hull, self._hull.reaches.copy()
+        middles = np.array([self._middle(n, d) for n, d in zip(hull.normals, hull.reaches, strict=True)])
+        for _ in range(_ROUNDS):
+            reaches += self._chosen(middles, reaches)[0]
+        return reaches
+
+    def _middle(self, normal: Array, reach: float) -> Array:
+        """Middle (3,) of a face."""
+        hull = self._hull
+        triangles = hull.corners[hull.triangles]
+        flat = np.abs(triangles @ normal - reach).max(axis=1) <= 2 * ALIKE * np.ptp(hull.corners, axis=0).max()
+        areas = np.linalg.norm(crossed(triangles[flat]), axis=1)
+        return np.asarray(areas @ triangles[flat].mean(axis=1) / areas.sum())
+
+    def _chosen(self, points: Array, reaches: Array | None = None) -> tuple[Array, Array]:
+        """How far points (..., 3) are outside, softly, and mean normals (..., 3) of the faces nearest to them."""
+        sharpness = _SHARPNESS / self.edge_radius
+        beyond = points @ self._hull.normals.T - (self._reaches if reaches is None else reaches)
+        most = beyond.max(axis=-1, keepdims=True)
+        weights = np.exp(sharpness * (beyond - most))
+        total = weights.sum(axis=-1, keepdims=True)
+        return (most + np.log(total) / sharpness)[..., 0], weights @ self._hull.normals / total
+
+    @cached_property
+    def helper(self) -> Array:
+        """See `Body`: of directions all about, the one that is farthest from all faces' normals."""
+        k = np.arange(200) + 0.5
+        height, around = 1 - k / 100, np.pi * (1 + np.sqrt(5)) * k
+        about = np.sqrt(1 - height**2)
+        tried = np.column_stack([about * np.cos(around), about * np.sin(around), height])
+        return np.asarray(tried[np.argmin(np.abs(tried @ self._hull.normals.T).max(axis=1))])
+
+    def core_point(self, point: Array) -> Array:
+        """See `Body`."""
+        return np.asarray(point - (self.signed_distance(point) + self.edge_radius) * self.outward(point))
+
+    def has_normal(self, point: Array) -> bool:
+        """See `Body`."""
+        return bool(np.linalg.norm(self._chosen(point)[1]) > 0.5)
+
+    def outward(self, point: Array) -> Array:
+        """See `Body`."""
+        mean = self._chosen(point)[1]
+        return np.asarray(mean / max(float(np.linalg.norm(mean)), 1e-9))
+
+    def signed_distance(self, point: Array) -> float:
+        """See `Body`."""
+        beyond, mean = self._chosen(point)
+        return float(beyond / max(float(np.linalg.norm(mean)), 1e-6) if beyond > 0 else beyond)
+
+    def on_surface(self, point: Array) -> Array:
+        """See `Body`."""
+        near = 1e-12 * float(np.ptp(self._hull.corners))
+        for _ in range(_STEPS):
+            beyond, mean = self._chosen(point)
+            if abs(beyond) < near:
+                break
+            point = point - beyond * mean / max(float(mean @ mean), 1e-3)
+        return np.asarray(point)
+
+    def support(self, direction: Array) -> Array:
+        """See `Body`."""
+        corners = self._core.corners
+        heights = corners @ direction
+        return np.asarray(corners[heights >= heights.max() - 1e-9 * np.ptp(corners, axis=0).max()])
+
+    @property
+    def _tetrahedra(self) -> tuple[Array, Array, Array]:
+        """Corners (T, 3, 3) of its triangles from a point (3,) inside, and volumes (T,) from there."""
+        inside = self._hull.corners.mean(axis=0)
+        arms = self._hull.corners[self._hull.triangles] - inside
+        return arms, inside, np.linalg.det(arms) / 6
+
+    @property
+    def volume(self) -> float:
+        """See `Body`; of the faces' polytope, as what follows."""
+        return float(self._tetrahedra[2].sum())
+
+    @property
+    def centroid(self) -> Array:
+        """See `Body`."""
+        arms, inside, parts = self._tetrahedra
+        return np.asarray(inside + parts @ arms.sum(axis=1) / 4 / parts.sum())
+
+    @property
+    def unit_inertia(self) -> Array:
+        """See `Body`: of tetrahedra, whose second moments are those of their corners and their middle."""
+        arms, inside, volumes = self._tetrahedra
+        whole = arms.sum(axis=1)
+        second = np.einsum("t,tki,tkj->ij", volumes, arms, arms) + np.einsum("t,ti,tj->ij", volumes, whole, whole)
+        middle = self.centroid - inside
+        moments = second / 20 / volumes.sum() - np.outer(middle, middle)
+        return np.asarray(np.trace(moments) * np.eye(3) - moments)
+
+    def placed(self, rotation: Array, position: Array) -> Convex:
+        """See `Body`."""
+        return Convex(np.asarray(self.vertices) @ rotation.T + position, self.edge_radius)
+
+    def edges(self) -> list[tuple[Array, Array]]:
+        """See `Body`."""
+        core = self._core
+        sides = {tuple(sorted((int(t[k - 1]), int(t[k])))) for t in core.triangles for k in range(3)}
+        return [(core.corners[i], core.corners[j]) for i, j in sorted(sides)]
+
+    def solids(self) -> tuple[Solid, ...]:
+        """See `Body`."""
+        hull = self._hull
+        return (Solid("convex", np.zeros(3), np.zeros(3), vertices=hull.corners, triangles=hull.triangles),)
+
+
+@cache
+def _of_counts(faces: int, corners: int) -> type[Convex]:
+    """The class of polytopes of so many faces, whose cores have so many corners."""
+    own = {"counts": (faces, corners), "width": 4 * faces + 3 * corners + 1, "__module__": __name__}
+    return type(f"Convex{faces}x{corners}", (Convex,), own)

@@ -1,0 +1,60 @@
+"""Polytopes in numbers: the least one about points, and what is well within it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
+
+Array = NDArray[np.float64]
+ALIKE = 1e-7  # of a unit normal, and of the size: faces that differ by less are one
+
+
+@dataclass(frozen=True)
+class Hull:
+    """A polytope in numbers: normals (F, 3) and reaches (F,) of its faces, corners (V, 3), triangles (T, 3) of them."""
+
+    normals: Array
+    reaches: Array
+    corners: Array
+    triangles: NDArray[np.int_]
+
+
+def hull_of(points: Array) -> Hull:
+    """The least polytope about points (V, 3), coplanar triangles one face.
+
+    Raises:
+        QhullError: they lie in a plane.
+    """
+    found = ConvexHull(points)
+    size, planes = float(np.ptp(points, axis=0).max()), found.equations
+    kept: list[Array] = []
+    for plane in planes:
+        if all(np.linalg.norm((plane - other)[:3]) > ALIKE or abs(plane - other)[3] > ALIKE * size for other in kept):
+            kept.append(plane)
+    faces = np.array(kept)
+    corners = points[found.vertices]
+    new = {int(old): k for k, old in enumerate(found.vertices)}
+    triangles = np.array([[new[int(v)] for v in triangle] for triangle in found.simplices])
+    inward = np.einsum("ti,ti->t", crossed(corners[triangles]), planes[:, :3]) < 0
+    triangles[inward] = triangles[inward][:, ::-1]
+    return Hull(faces[:, :3], -faces[:, 3], corners, triangles)
+
+
+def crossed(triangles: Array) -> Array:
+    """Normals (T, 3) of triangles (T, 3, 3), twice their areas long."""
+    return np.asarray(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]))
+
+
+def within(hull: Hull, by: float) -> Hull | None:
+    """What is at least so far inside of all faces of a hull; None where nothing is."""
+    inside = hull.corners.mean(axis=0)
+    halves = np.column_stack([hull.normals, by - hull.reaches])
+    if (halves[:, :3] @ inside + halves[:, 3]).max() >= 0:
+        return None
+    try:
+        return hull_of(np.unique(HalfspaceIntersection(halves, inside).intersections.round(15), axis=0))
+    except QhullError:
+        return None

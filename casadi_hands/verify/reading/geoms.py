@@ -1,0 +1,87 @@
+"""Solids of ``scene.xml``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from casadi_hands.errors import DesignError
+from casadi_hands.verify.flat import Box, Convex
+from casadi_hands.verify.reading.markup import called, number, numbers, positive, strangers
+from casadi_hands.verify.shapes import Capsule, Cylinder, Shape
+
+_GEOM = "name type pos quat mesh fromto size friction condim priority solref solimp rgba"
+_FRICTION = "1 0.005 0.0001"
+
+
+@dataclass(frozen=True)
+class Geom:
+    """A solid of a body.
+
+    Attributes:
+        kind: ``sphere``, ``capsule``, ``cylinder``, ``box``, ``mesh`` or ``plane``.
+        place: (3,) m, where the file puts it, body frame; of a plane, a point of it.
+        shape: what it is; None of a plane, or of what the format does not have.
+        friction: (3,) sliding, torsional (m) and rolling (m).
+        priority: whose friction holds where two touch.
+    """
+
+    kind: str
+    place: np.ndarray
+    shape: Shape | None
+    friction: np.ndarray
+    priority: float
+
+
+def read_geom(path: Path, meshes: Mapping[str, Convex], element: Element) -> tuple[Geom, list[str]]:
+    """Read a solid.
+
+    Args:
+        path: of the scene.
+        meshes: polytopes by name.
+        element: ``<geom>``.
+
+    Returns:
+        What it is, and what of it the format does not have.
+    """
+    strange = list(strangers(element, "", _GEOM))
+    kind = element.get("type", "sphere")
+    place = numbers(path, element, "pos", 3, "0 0 0")
+    shape: Shape | None = None
+    if kind == "sphere":
+        shape = Capsule(place, place, positive(path, element, "size"))
+    elif kind == "capsule" or (kind == "cylinder" and element.get("fromto") is not None):
+        ends = numbers(path, element, "fromto", 6)
+        shape = (Capsule if kind == "capsule" else Cylinder)(ends[:3], ends[3:], positive(path, element, "size"))
+    elif kind == "cylinder":
+        radius, half = numbers(path, element, "size", 2)
+        reach = np.array([0.0, 0.0, half])
+        shape = Cylinder(place - reach, place + reach, float(radius))
+    elif kind == "box":
+        sides, turn = 2 * numbers(path, element, "size", 3), numbers(path, element, "quat", 4, "1 0 0 0")
+        if sides.min() <= 0.0 or np.linalg.norm(turn) < 1e-3:
+            raise DesignError(f"{path}: {called(element)} is a box without sides or orientation")
+        shape = Box(sides, place, Rotation.from_quat(turn, scalar_first=True).as_matrix())
+    elif kind == "mesh":
+        shape = meshes.get(element.get("mesh", ""))
+        if element.get("pos") is not None:
+            strange.append(f"{called(element)} is not where its mesh is: it has a place of its own")
+    elif kind != "plane":
+        strange.append(f"{called(element)} is a {kind}, which the format does not have")
+    if kind != "box" and element.get("quat") is not None:
+        strange.append(f"{called(element)} is turned, which a {kind} is not")
+    read_looks(path, element)
+    friction = numbers(path, element, "friction", 3, _FRICTION)
+    return Geom(kind, place, shape, friction, number(path, element, "priority", "0")), strange
+
+
+def read_looks(path: Path, element: Element) -> None:
+    """Read what of a solid is compared with nothing, so that it is numbers."""
+    for name, count in (("rgba", 4), ("solref", 2), ("solimp", 3), ("condim", 1)):
+        if element.get(name) is not None:
+            numbers(path, element, name, count)

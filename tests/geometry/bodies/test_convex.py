@@ -1,0 +1,117 @@
+"""Polytopes: coal and trimesh measure the sharp one; symbols against numbers; mass properties by coal; task files."""
+
+from __future__ import annotations
+
+import pickle
+
+import coal
+import numpy as np
+import pytest
+
+from casadi_hands.errors import TaskError
+from casadi_hands.geometry.bodies import KINDS
+from casadi_hands.geometry.bodies.box import Box
+from casadi_hands.geometry.bodies.convex import Convex
+from casadi_hands.task import parse_task
+from tests.geometry.bodies import checks
+from tests.stages.synthesis.example import BALL
+
+CRATE = Box(np.array([0.1, -0.2, 0.3]), np.array([0.8, 1.4, 2.0]), np.array([0.3, -0.5, 0.9]), 0.01)
+CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * CRATE.size / 2
+SAME = Convex(CRATE.center + CORNERS @ CRATE.turn.T, 0.01)
+WEDGE = Convex(np.array([[0, 0, 0], [2, 0, 0], [0, 1, 0], [0, 0, 1], [2, 0, 1.0], [1, 0.3, 0.4]]), 0.01)
+ANGLES = 2 * np.pi * np.arange(24) / 24
+PRISM = Convex(np.array([[np.cos(a), np.sin(a), z] for a in ANGLES for z in (-1, 1)]), 0.01)
+
+
+def test_a_box_is_a_box(rng: np.random.Generator) -> None:
+    assert SAME.counts == (6, 8)
+    for point in checks.around(CRATE, rng, 300):
+        expected, found = CRATE.signed_distance(point), SAME.signed_distance(point)
+        local = np.abs(CRATE.turn.T @ (point - CRATE.center)) - CRATE.size / 2
+        if np.diff(np.sort(local))[1] > 0.1 and np.sort(local)[1] < -0.1:  # beside a face alone
+            assert found == pytest.approx(expected, abs=1e-6)
+            np.testing.assert_allclose(SAME.outward(point), CRATE.outward(point), atol=1e-6)
+        elif expected > 0:
+            assert 0.5 * expected < found < expected + 0.01
+    assert SAME.volume == pytest.approx(CRATE.volume)
+    np.testing.assert_allclose(SAME.centroid, CRATE.centroid, atol=1e-12)
+    np.testing.assert_allclose(SAME.unit_inertia, CRATE.unit_inertia, atol=1e-12)
+
+
+@pytest.mark.parametrize("body", [SAME, WEDGE, PRISM], ids=["box", "wedge", "prism"])
+def test_its_surface_is_next_to_the_sharp_one(body: Convex, rng: np.random.Generator) -> None:
+    """Coal measures how far points of the surface are from the polytope: along edges within it, at faces on it."""
+    hull = coal.Convex.convexHull(_points(np.asarray(body.vertices)), True, "Qt")
+    off = []
+    for point in checks.around(body, rng, 200):
+        on = body.on_surface(point)
+        assert body.signed_distance(on) == pytest.approx(0, abs=1e-9)
+        tiny = coal.Sphere(1e-9), coal.Transform3s(np.eye(3), on)
+        request, result = coal.DistanceRequest(), coal.DistanceResult()
+        off.append(coal.distance(hull, coal.Transform3s.Identity(), *tiny, request, result))
+    assert min(off) > -0.02
+    assert max(off) < 5e-3
+    assert np.median(np.abs(off)) < 4e-3
+
+
+def _points(vertices: np.ndarray) -> coal.StdVec_Vec3s:
+    points = coal.StdVec_Vec3s()
+    points.extend(list(vertices))
+    return points
+
+
+@pytest.mark.parametrize("body", [SAME, WEDGE, PRISM], ids=["box", "wedge", "prism"])
+def test_symbols(body: Convex, rng: np.random.Generator) -> None:
+    function = checks.surface_function(body)
+    for point in checks.around(body, rng, 100):
+        distance, normal, *_ = (np.asarray(value).ravel() for value in function(point, body.parameters))
+        assert distance[0] == pytest.approx(body.signed_distance(point), abs=1e-9)
+        if body.has_normal(point):
+            np.testing.assert_allclose(normal, body.outward(point), atol=1e-6)
+    checks.check_lowest(body, rng)
+    checks.check_placed(body, rng)
+
+
+def test_derivatives_are_finite_anywhere() -> None:
+    corners = [corner for edge in WEDGE.edges() for corner in edge]
+    checks.check_finite(WEDGE, [WEDGE.centroid, 1e3 * np.ones(3), *corners[:3]])
+
+
+def test_mass_properties_are_those_of_coal() -> None:
+    hull = coal.Convex.convexHull(_points(np.asarray(WEDGE.vertices)), True, "Qt")
+    assert WEDGE.volume == pytest.approx(hull.computeVolume())
+    np.testing.assert_allclose(WEDGE.centroid, hull.computeCOM(), atol=1e-9)
+    expected = hull.computeMomentofInertiaRelatedToCOM() / hull.computeVolume()
+    np.testing.assert_allclose(WEDGE.unit_inertia, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("body", [SAME, PRISM], ids=["box", "prism"])
+def test_the_distance_of_a_link_is_that_of_coal(body: Convex, rng: np.random.Generator) -> None:
+    """Near the surface; farther off beside edges it is too small."""
+    hull = coal.Convex.convexHull(_points(np.asarray(body.vertices)), True, "Qt")
+    checks.check_links(body, (hull, coal.Transform3s.Identity()), rng, near=0.1, short=0.05, swept=body.ball)
+
+
+def test_it_travels() -> None:
+    there = pickle.loads(pickle.dumps(PRISM))
+    assert type(there) is type(PRISM)
+    np.testing.assert_array_equal(there.parameters, PRISM.parameters)
+
+
+def test_a_task_file_gives_a_polytope() -> None:
+    ball = "sphere: {center: [0, 0, 0], radius: 0.03}"
+    points = [[x, y, z] for x in (-0.02, 0.02) for y in (-0.03, 0.03) for z in (-0.03, 0.03)]
+    given = f"convex: {{vertices: {points}}}"
+    (shape,) = parse_task(BALL.replace(ball, given)).object.shapes
+    assert isinstance(shape.body, KINDS["convex"])
+    assert shape.body.counts == (6, 8)
+    assert shape.edge_radius == pytest.approx(0.0002)
+    flat = [[x, y, 0.0] for x, y, _ in points]
+    for wrong, allowed in (
+        (f"convex: {{vertices: {flat}}}", "four points or more that do not lie in one plane"),
+        (f"convex: {{vertices: {points[:3]}}}", "4"),
+        (f"convex: {{vertices: {points}, edge_radius: 0.02}}", "an edge_radius smaller than half its least width"),
+    ):
+        with pytest.raises(TaskError, match=allowed):
+            parse_task(BALL.replace(ball, wrong))
