@@ -65,7 +65,7 @@ def _lines(task: Task, force_limit: float) -> Iterator[tuple[str, str]]:
 
 def _object(task: Task) -> str:
     kinds = Counter(shape.body.kind for shape in task.object.shapes)
-    shapes = " and ".join(f"{count} {kind}{'s' * (count > 1)}" for kind, count in sorted(kinds.items()))
+    shapes = " and ".join(f"{count} {_plural(kind, count)}" for kind, count in sorted(kinds.items()))
     return f"{task.object.mass:g} kg; {shapes}, {2e3 * task.object.characteristic_length:.4g} mm at its longest"
 
 
@@ -116,3 +116,9 @@ def _mm(point: Sequence[float]) -> str:
 def _numbers(values: Sequence[float] | np.ndarray) -> str:
     # Adding 0 turns -0 into 0.
     return f"[{', '.join(f'{round(float(value), 12) + 0:.4g}' for value in values)}]"
+
+
+def _plural(kind: str, count: int) -> str:
+    """A shape's name, of one or of many."""
+    one, many = {"box": ("box", "boxes"), "convex": ("polytope", "polytopes")}.get(kind, (kind, f"{kind}s"))
+    return one if count == 1 else many

@@ -9,6 +9,7 @@ press as planned.
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Mapping
 from importlib import import_module
 from math import degrees, radians
 from pathlib import Path
@@ -21,6 +22,7 @@ from scipy.spatial.transform import Rotation
 
 from casadi_hands.errors import HandsError
 from casadi_hands.export.markup import document
+from casadi_hands.export.meshes import mesh_files
 from casadi_hands.export.targets.source import Source, write_texts
 from casadi_hands.export.targets.target import Target
 from casadi_hands.export.urdf import object_urdf
@@ -48,7 +50,7 @@ def write_usd(source: Source, out: Path) -> Path:
     _drive(usd, hand, source)
     _pose(usd, hand, source)
     _rub(usd, hand, hand.GetDefaultPrim(), source.task.friction)
-    item = _converted(usd, "object", object_urdf(source.task))
+    item = _converted(usd, "object", object_urdf(source.task), mesh_files(source.task))
     # What the converter adds to any robot that stands on nothing: a joint that fixes it to the world.
     item.RemovePrim("/object/Physics")
     _rub(usd, item, item.GetDefaultPrim(), source.task.friction)
@@ -76,8 +78,15 @@ def _load() -> Any:
         raise HandsError("the export to usd needs urdf-usd-converter: pip install 'casadi-hands[usd]'") from None
 
 
-def _converted(usd: Any, name: str, urdf: str) -> Any:
-    """A stage in memory, of one layer, with what the converter makes of a robot called `name`."""
+def _converted(usd: Any, name: str, urdf: str, files: Mapping[str, str] | None = None) -> Any:
+    """A stage in memory, of one layer, with what the converter makes of a robot called `name`.
+
+    Args:
+        usd: its modules.
+        name: of the robot.
+        urdf: its text.
+        files: that it names, by their paths.
+    """
     robot = ElementTree.fromstring(urdf)
     # For other readers; the converter would keep them as custom data.
     for element in [*robot.findall("mujoco"), *robot.findall("transmission")]:
@@ -85,6 +94,9 @@ def _converted(usd: Any, name: str, urdf: str) -> Any:
     with tempfile.TemporaryDirectory() as scratch, _Quiet(usd.usdex):
         file = Path(scratch) / f"{name}.urdf"
         file.write_text(document(robot), encoding="utf-8")
+        for path, text in (files or {}).items():
+            (Path(scratch) / path).parent.mkdir(exist_ok=True)
+            (Path(scratch) / path).write_text(text, encoding="utf-8")
         asset = usd.converter.Converter(scene=False).convert(str(file), str(Path(scratch) / name))
         stage = usd.Usd.Stage.Open(asset.path)
         # Instances would be written as prototypes whose names depend on the order in which threads find them.
