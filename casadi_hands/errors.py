@@ -21,3 +21,21 @@ class SolveError(HandsError):
 
 class KinematicsError(HandsError):
     """The compiled kinematics extension is missing or was built against another CasADi."""
+
+
+class MeshError(HandsError):
+    """A mesh cannot be used; the message says what was given and what is allowed.
+
+    Attributes:
+        given: what the file holds, in the user's terms.
+        allowed: what would do.
+    """
+
+    def __init__(self, given: str, allowed: str) -> None:
+        """Both halves of the message."""
+        super().__init__(f"given {given}; allowed: {allowed}")
+        self.given, self.allowed = given, allowed
+
+    def __reduce__(self) -> tuple[type[MeshError], tuple[str, str]]:
+        """As it was made: processes send it to each other."""
+        return MeshError, (self.given, self.allowed)

@@ -26,6 +26,8 @@ from pathlib import Path
 import casadi as ca
 from casadi import Function
 
+from casadi_hands.cache import cache_folder
+
 log = logging.getLogger(__name__)
 # No contraction of a*b+c: a compiled kernel rounds as the interpreted one does.
 _FLAGS = ("-fPIC", "-shared", "-ffp-contract=off")
@@ -42,19 +44,6 @@ def compiler() -> str | None:
     if found is None:
         log.warning("no C compiler found: kernels are interpreted, which is several times slower")
     return found
-
-
-def cache_folder() -> Path:
-    """Where compiled kernels are kept: ``$CASADI_HANDS_CACHE``, else the user's cache folder.
-
-    Raises:
-        RuntimeError: the user has no home folder.
-    """
-    named = os.environ.get("CASADI_HANDS_CACHE")
-    if named:
-        # The loader searches its own path for a bare file name, so the folder has to be absolute.
-        return Path(named).absolute()
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache").absolute() / "casadi-hands"
 
 
 @dataclass(frozen=True)
