@@ -12,6 +12,7 @@ from casadi_hands.meshes.mesh import Mesh
 from casadi_hands.meshes.winding import surface_points, winding_numbers
 
 _GAP = 1e-3  # of the size
+_ASKED = 200  # points of a part, the farthest from the mesh, of which it is found out on which side they are
 
 
 def union_error(mesh: Mesh, parts: Sequence[Mesh], samples: int = 4000) -> tuple[float, float]:
@@ -28,15 +29,18 @@ def union_error(mesh: Mesh, parts: Sequence[Mesh], samples: int = 4000) -> tuple
     """
     points = np.vstack([mesh.vertices[:: 1 + len(mesh.vertices) // samples], surface_points(mesh, samples)[0]])
     beyond = np.min([outside_distance(part, points) for part in parts], axis=0)
-    missing, added = max(float(beyond.max()), 0.0), max(-float(beyond.min()), 0.0)
+    missing, added = float(beyond.max(initial=0.0)), abs(float(beyond.min(initial=0.0)))
     for k, part in enumerate(parts):
         surface, normals = surface_points(part, samples // len(parts) + 50)
-        covered = [_beyond_planes(other, surface + _GAP * mesh.size * normals) for j, other in enumerate(parts) if j != k]
+        covered = [
+            _beyond_planes(other, surface + _GAP * mesh.size * normals) for j, other in enumerate(parts) if j != k
+        ]
         free = surface[np.min(covered, axis=0) > 0] if covered else surface
         away = surface_distance(mesh, free)
-        within = winding_numbers(mesh, free) > 0.5
-        missing = max(missing, float(away[within].max(initial=0.0)))
-        added = max(added, float(away[~within].max(initial=0.0)))
+        farthest = np.argsort(-away)[:_ASKED]
+        within = winding_numbers(mesh, free[farthest]) > 0.5
+        missing = max(missing, float(away[farthest][within].max(initial=0.0)))
+        added = max(added, float(away[farthest][~within].max(initial=0.0)))
     return missing, added
 
 

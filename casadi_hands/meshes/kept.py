@@ -10,13 +10,14 @@ import tempfile
 import zipfile
 import zlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from casadi_hands.cache import cache_folder
 
-Arrays = dict[str, NDArray[np.generic]]
+Arrays = dict[str, NDArray[Any]]
 
 
 def key_of(*content: object) -> str:
@@ -34,7 +35,9 @@ def load(key: str) -> Arrays | None:
         path = _path(key)
         with path.open("rb") as file:
             status = os.fstat(file.fileno())
-            if hasattr(os, "getuid") and (status.st_uid != os.getuid() or status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)):
+            if hasattr(os, "getuid") and (
+                status.st_uid != os.getuid() or status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+            ):
                 return None
             with np.load(file, allow_pickle=False) as archive:
                 found = {name: archive[name] for name in archive.files}
@@ -51,7 +54,7 @@ def keep(key: str, arrays: Arrays) -> None:
         handle, name = tempfile.mkstemp(dir=path.parent)
         try:
             with os.fdopen(handle, "wb") as file:
-                np.savez(file, key=np.array(key), **arrays)
+                np.savez(file, allow_pickle=False, **{"key": np.array(key), **arrays})
             Path(name).replace(path)
         except BaseException:
             Path(name).unlink(missing_ok=True)

@@ -10,10 +10,10 @@ from casadi_hands.errors import MeshError
 from casadi_hands.meshes.extra import needed
 from casadi_hands.meshes.mesh import Mesh
 from casadi_hands.meshes.polygons import triangulated
-from casadi_hands.meshes.topology import edges_of, loops, pieces, with_one_winding
+from casadi_hands.meshes.topology import distinct_rows, edges_of, loops, pieces, with_one_winding
 from casadi_hands.meshes.winding import overlapped, winding_numbers
 
-MOST_FACES, DECIMATED = 100_000, 40_000
+MOST_FACES, DECIMATED = 50_000, 20_000
 """Above the first, a mesh is brought down to the second."""
 _MERGED = 1e-7  # of the size: STL has no more digits
 _HOLE = 0.1  # of the size: larger ones may be meant
@@ -49,17 +49,15 @@ def _merged(mesh: Mesh) -> Mesh:
     used, faces = np.unique(mesh.faces, return_inverse=True)
     points, faces = mesh.vertices[used], faces.reshape(-1, 3)
     cell = max(_MERGED * Mesh(points, faces).size, 1e-300)
-    _, kept, place = np.unique(np.round(points / cell), axis=0, return_index=True, return_inverse=True)
-    order = np.argsort(np.argsort(kept))  # in the order of the file
-    return Mesh(points[np.sort(kept)], order[place.ravel()][faces].astype(np.int64))
+    kept, place = distinct_rows(np.round(points / cell).astype(np.int64))
+    return Mesh(points[kept], place[faces])
 
 
 def _without_doubles(mesh: Mesh, notes: list[str]) -> Mesh:
     """No face with a corner twice, and none given twice."""
     ordered = np.sort(mesh.faces, axis=1)
     proper = (ordered[:, 0] < ordered[:, 1]) & (ordered[:, 1] < ordered[:, 2])
-    _, first = np.unique(ordered[proper], axis=0, return_index=True)
-    faces = mesh.faces[proper][np.sort(first)]
+    faces = mesh.faces[proper][distinct_rows(ordered[proper])[0]] if proper.any() else mesh.faces[:0]
     if not proper.all():
         notes.append(f"dropped {_count(int((~proper).sum()), 'face')} without area")
     if len(faces) < proper.sum():
@@ -74,7 +72,8 @@ def _sides_agree(mesh: Mesh, notes: list[str]) -> Mesh:
     if turned < 0:
         raise MeshError("a surface with one side only, as a Möbius strip has", "the surface of a solid")
     if turned:
-        notes.append(f"turned {_count(turned, 'face')} that looked the other way than {'its' * (turned == 1) or 'their'} neighbours")
+        neighbours = "its neighbours" if turned == 1 else "their neighbours"
+        notes.append(f"turned {_count(turned, 'face')} that looked another way than {neighbours}")
     return Mesh(mesh.vertices, faces)
 
 
@@ -89,8 +88,8 @@ def _with_holes_closed(mesh: Mesh, notes: list[str]) -> Mesh:
     around = loops(np.where(backward[:, None], ends[:, ::-1], ends))
     widths = [float(np.linalg.norm(np.ptp(mesh.vertices[loop], axis=0))) for loop in around]
     most = _HOLE * mesh.size
-    too_large = [w for w, loop in zip(widths, around, strict=True) if (w > most and len(loop) > 3) or len(loop) < 3]
-    if too_large:
+    known = {tuple(sorted(face)) for face in mesh.faces.tolist()} if around else set()
+    if any(_is_open(loop, width > most, known) for loop, width in zip(around, widths, strict=True)):
         wide = f"{_count(len(around), 'hole')}, the largest {1e3 * max(widths):.3g} mm across"
         raise MeshError(f"an open surface: {wide}", f"{_CLOSED} (holes of up to {1e3 * most:.3g} mm are closed)")
     patches = [np.array(loop)[triangulated(mesh.vertices[loop])] for loop in around]
@@ -99,6 +98,11 @@ def _with_holes_closed(mesh: Mesh, notes: list[str]) -> Mesh:
     if edges_of(closed.faces).balance.any():
         raise MeshError(f"an open surface: {_count(len(around), 'hole')} that cannot be closed", _CLOSED)
     return closed
+
+
+def _is_open(loop: list[int], wide: bool, faces: set[tuple[int, ...]]) -> bool:
+    """Whether a hole may be meant: it is wide and no missing triangle, or all that there is about it is one."""
+    return len(loop) < 3 or (tuple(sorted(loop)) in faces if len(loop) == 3 else wide)
 
 
 def _outward(mesh: Mesh, notes: list[str]) -> Mesh:
@@ -115,13 +119,12 @@ def _outward(mesh: Mesh, notes: list[str]) -> Mesh:
     if not solid.all():
         notes.append(f"dropped {_count(int((~solid).sum()), 'piece')} without volume")
     parts, volumes = [part for part, kept in zip(parts, solid, strict=True) if kept], volumes[solid]
-    turn = np.full(len(parts), volumes.sum() < 0)
-    for k, part in enumerate(parts):
-        sign = -1.0 if turn[k] else 1.0
-        if sign * volumes[k] < 0 and not _is_cavity(k, parts, -1.0 if volumes.sum() < 0 else 1.0):
-            turn[k] = ~turn[k]
+    sign = -1.0 if volumes.sum() < 0 else 1.0
+    turn = np.array([sign * v < 0 and not _is_cavity(k, parts, sign) for k, v in enumerate(volumes)]) ^ (sign < 0)
     if turn.any():
-        notes.append("turned the surface inside out" if turn.all() else f"turned {int(turn.sum())} pieces inside out")
+        notes.append(
+            "turned the surface inside out" if turn.all() else f"turned {_count(int(turn.sum()), 'piece')} inside out"
+        )
     faces = [part.faces[:, ::-1] if t else part.faces for part, t in zip(parts, turn, strict=True)]
     return _merged(Mesh(mesh.vertices, np.vstack(faces)))
 
@@ -143,7 +146,9 @@ def _coarse_enough(mesh: Mesh, notes: list[str]) -> Mesh:
     coarse = _without_doubles(_merged(Mesh(points.astype(np.float64), faces.astype(np.int64))), [])
     lost = abs(coarse.volume / mesh.volume - 1)
     if edges_of(coarse.faces).balance.any() or lost > 0.01:
-        raise MeshError(f"{len(mesh.faces)} faces, which cannot be made fewer", f"at most {MOST_FACES}; export a coarser mesh")
+        raise MeshError(
+            f"{len(mesh.faces)} faces, which cannot be made fewer", f"at most {MOST_FACES}; export a coarser mesh"
+        )
     notes.append(f"made {len(coarse.faces)} faces of {len(mesh.faces)}, which changed the volume by {lost:.2g} of it")
     return coarse
 

@@ -22,6 +22,7 @@ from casadi_hands.meshes.mesh import Mesh
 _VERSION = 1  # of what is kept
 _CONVEX = 0.01  # share of the volume, and of the size, by which a hull may be more than its mesh
 _REDUCED = 1e-3  # of the size
+_VERTICES = 96  # of few parts together
 _LONGEST = 600.0  # s
 # A process of its own, for a library that cannot be interrupted and, on a mesh that it does not like, ends its process.
 _CUT = """
@@ -39,7 +40,7 @@ class Decomposition:
     """Convex parts that stand for a mesh.
 
     Attributes:
-        parts: closed convex meshes of at most `MOST_VERTICES` vertices each, m.
+        parts: closed convex meshes of few vertices: at most 32 each, or 96 together, m.
         missing: the most by which the mesh stands out of their union, m, sampled.
         added: the most by which their union stands out of the mesh, m, sampled.
     """
@@ -74,7 +75,7 @@ def convex_parts(mesh: Mesh, parts: int, threshold: float = 0.02) -> Decompositi
         MeshError: coacd is not installed, or cannot do it.
     """
     vertices, faces = np.ascontiguousarray(mesh.vertices, "<f8"), np.ascontiguousarray(mesh.faces, "<i8")
-    key = key_of(_VERSION, vertices, faces, parts, threshold, MOST_VERTICES, _CONVEX, _REDUCED)
+    key = key_of(_VERSION, vertices, faces, parts, threshold, MOST_VERTICES, _VERTICES, _CONVEX, _REDUCED)
     found = _loaded(key)
     if found is None:
         found = _made(mesh, parts, threshold)
@@ -93,17 +94,15 @@ def _loaded(key: str) -> Decomposition | None:
 
 def _made(mesh: Mesh, most: int, threshold: float) -> Decomposition:
     whole = hull(mesh.vertices)
-    if whole.volume - mesh.volume <= _CONVEX * mesh.volume:
-        missing, added = union_error(mesh, [whole])
-        if added <= _CONVEX * mesh.size:
-            return _reduced(mesh, [mesh.vertices])
-    if most == 1:
+    convex = whole.volume - mesh.volume <= _CONVEX * mesh.volume
+    if most == 1 or (convex and union_error(mesh, [whole])[1] <= _CONVEX * mesh.size):
         return _reduced(mesh, [mesh.vertices])
     return _reduced(mesh, _cut(mesh, most, threshold * float(np.ptp(mesh.vertices, axis=0).max())))
 
 
 def _reduced(mesh: Mesh, clouds: Sequence[NDArray[np.float64]]) -> Decomposition:
-    parts = tuple(reduced(cloud, _REDUCED * mesh.size)[0] for cloud in clouds)
+    most = max(MOST_VERTICES, _VERTICES // len(clouds))
+    parts = tuple(reduced(cloud, _REDUCED * mesh.size, most)[0] for cloud in clouds)
     return Decomposition(parts, *union_error(mesh, parts))
 
 
@@ -120,13 +119,19 @@ def _cut(mesh: Mesh, parts: int, threshold: float) -> list[NDArray[np.float64]]:
                 clouds = [archive[name] for name in archive.files]
         except subprocess.TimeoutExpired:
             allowed = f"a mesh that can be in {_LONGEST:g} s; give it fewer faces"
-            raise MeshError(f"a mesh of {len(mesh.faces)} faces that coacd has not cut into convex parts", allowed) from None
+            raise MeshError(
+                f"a mesh of {len(mesh.faces)} faces that coacd has not cut into convex parts", allowed
+            ) from None
         except (subprocess.CalledProcessError, OSError) as error:
             said = getattr(error, "stderr", b"") or b""
             last = said.decode(errors="replace").strip().splitlines()[-1:] or [str(error)]
-            raise MeshError(f"a mesh that coacd cannot cut into convex parts ({last[0][:120]})", "a simpler mesh") from None
+            raise MeshError(
+                f"a mesh that coacd cannot cut into convex parts ({last[0][:120]})", "a simpler mesh"
+            ) from None
     size = mesh.size
-    solid = [cloud for cloud in clouds if len(cloud) >= 4 and np.linalg.svd(cloud - cloud.mean(axis=0))[1][2] > 1e-6 * size]
+    solid = [
+        cloud for cloud in clouds if len(cloud) >= 4 and np.linalg.svd(cloud - cloud.mean(axis=0))[1][2] > 1e-6 * size
+    ]
     if not solid:
         raise MeshError("a mesh of which coacd makes no convex parts", "a simpler mesh")
     return solid

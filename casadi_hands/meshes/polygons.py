@@ -43,7 +43,8 @@ def _flattened(points: NDArray[np.float64]) -> NDArray[np.float64]:
     normal = normal / length if length > 0 else np.array([0.0, 0.0, 1.0])
     across = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
     across /= np.linalg.norm(across)
-    return (points - points[0]) @ np.column_stack([across, np.cross(normal, across)])
+    flat: NDArray[np.float64] = (points - points[0]) @ np.column_stack([across, np.cross(normal, across)])
+    return flat
 
 
 def _ear(corners: NDArray[np.float64]) -> int:

@@ -38,6 +38,19 @@ class Edges:
         return np.rint(np.bincount(self.of_side, signs, minlength=len(self.ends))).astype(np.int64)
 
 
+def distinct_rows(rows: Ints) -> tuple[Ints, Ints]:
+    """Rows (N, K) that differ: where each comes first, in the order of their coming, and for each row which it is (N,).
+
+    As `numpy.unique` does, which takes several times longer for rows.
+    """
+    order = np.lexsort(rows.T[::-1])
+    changes = np.concatenate([[True], (np.diff(rows[order], axis=0) != 0).any(axis=1)])
+    kept = order[changes]  # sorting is stable: the first of its kind
+    which = np.empty(len(rows), dtype=np.int64)
+    which[order] = np.cumsum(changes) - 1
+    return np.sort(kept), np.argsort(np.argsort(kept))[which]
+
+
 def edges_of(faces: Ints) -> Edges:
     """Edges of faces (F, 3)."""
     sides = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
