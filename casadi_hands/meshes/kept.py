@@ -49,12 +49,12 @@ def load(key: str) -> Arrays | None:
 def keep(key: str, arrays: Arrays) -> None:
     """Keep arrays under a name where that is possible; whoever reads meanwhile finds all or nothing."""
     with contextlib.suppress(OSError, RuntimeError):
-        path = _path(key)
+        path, everything = _path(key), dict[str, Any](arrays, key=np.array(key))
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(dir=path.parent)
         try:
             with os.fdopen(handle, "wb") as file:
-                np.savez(file, allow_pickle=False, **{"key": np.array(key), **arrays})
+                np.savez(file, **everything)
             Path(name).replace(path)
         except BaseException:
             Path(name).unlink(missing_ok=True)
