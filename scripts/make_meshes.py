@@ -86,9 +86,9 @@ def obj(solid: Solid, name: str) -> bytes:
 
 
 FILES = {
-    "hammer.stl": (stl, hammer, 4),
+    "hammer.stl": (stl, hammer, 16),
     "mug.stl": (stl, mug, 16),
-    "toy_brick.obj": (obj, toy_brick, 9),
+    "toy_brick.obj": (obj, toy_brick, 16),
 }
 """How each file is written, of what, and how many convex parts it is cut into."""
 

@@ -31,6 +31,8 @@ def check_summary(task: Task) -> tuple[RenderableType, bool]:
 
 def _lines(task: Task, force_limit: float) -> Iterator[tuple[str, str]]:
     yield "object", _object(task)
+    for mesh in task.object.meshes or ():
+        yield "", f"{mesh.file}: {mesh.sentence}"
     yield "", f"inertia, principal: {_numbers(np.linalg.eigvalsh(np.array(task.object.inertia)))} kg·m²"
     yield "palm", _palm(task)
     for i, (name, finger) in enumerate(task.fingers.items()):

@@ -118,7 +118,7 @@ def read_design(directory: Path) -> dict[str, Any]:
     """
     record = _read_record(directory)
     try:
-        task = load_task(directory / "task.yaml")
+        task = load_task(directory / "task.yaml", within=True)
     except TaskError as error:
         raise DesignError(f"{directory}: the design's task cannot be read: {error}") from error
     try:

@@ -2,7 +2,7 @@
 
 from casadi_hands.meshes.mend import mend
 from casadi_hands.meshes.mesh import Mesh, mass_properties, scaled
-from casadi_hands.meshes.parts import Decomposition, convex_parts
+from casadi_hands.meshes.parts import Decomposition, convex_parts, told
 from casadi_hands.meshes.read import read_mesh
 
-__all__ = ["Decomposition", "Mesh", "convex_parts", "mass_properties", "mend", "read_mesh", "scaled"]
+__all__ = ["Decomposition", "Mesh", "convex_parts", "mass_properties", "mend", "read_mesh", "scaled", "told"]

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from casadi_hands.errors import MeshError
 from casadi_hands.meshes.error import union_error
@@ -19,10 +20,11 @@ from casadi_hands.meshes.hull import MOST_VERTICES, hull, reduced
 from casadi_hands.meshes.kept import keep, key_of, load
 from casadi_hands.meshes.mesh import Mesh
 
-_VERSION = 1  # of what is kept
+_VERSION = 2  # of what is kept
 _CONVEX = 0.01  # share of the volume, and of the size, by which a hull may be more than its mesh
 _REDUCED = 1e-3  # of the size
 _VERTICES = 96  # of few parts together
+_ROUNDED = 1e-4  # of the size: what coacd may move vertices by
 _LONGEST = 600.0  # s
 # A process of its own, for a library that cannot be interrupted and, on a mesh that it does not like, ends its process.
 _CUT = """
@@ -56,8 +58,17 @@ class Decomposition:
 
     def __str__(self) -> str:
         """A sentence, lengths in mm."""
-        count = f"{len(self.parts)} convex part{'s' * (len(self.parts) != 1)}"
-        return f"{count}, which leave out up to {1e3 * self.missing:.2g} mm and add up to {1e3 * self.added:.2g} mm"
+        return told(len(self.parts), self.missing, self.added)
+
+
+def told(parts: int, missing: float, added: float) -> str:
+    """How many convex parts there are and how far they are from their mesh, see `Decomposition`, in mm."""
+    out, over = (f"up to {round(1e3 * length, 2):g} mm" for length in (missing, added))
+    return (
+        f"1 convex part, which leaves out {out} and adds {over}"
+        if parts == 1
+        else (f"{parts} convex parts, which leave out {out} and add {over}")
+    )
 
 
 def convex_parts(mesh: Mesh, parts: int, threshold: float = 0.02) -> Decomposition:
@@ -134,4 +145,10 @@ def _cut(mesh: Mesh, parts: int, threshold: float) -> list[NDArray[np.float64]]:
     ]
     if not solid:
         raise MeshError("a mesh of which coacd makes no convex parts", "a simpler mesh")
-    return solid
+    return [_snapped(cloud, mesh) for cloud in solid]
+
+
+def _snapped(points: NDArray[np.float64], mesh: Mesh) -> NDArray[np.float64]:
+    """Points (N, 3) that are vertices of a mesh but for coacd's rounding, put back there."""
+    apart, nearest = KDTree(mesh.vertices).query(points)
+    return np.where((apart < _ROUNDED * mesh.size)[:, None], mesh.vertices[nearest], points)

@@ -55,6 +55,7 @@ def _follows_from_another(error: ErrorDetails) -> bool:
 def _known(error: ErrorDetails) -> Problem:
     path, kind, given = error["loc"], error["type"], _show(error["input"])
     context = {**error.get("ctx", {}), "names": ", ".join(names_at(path))}
+    given = context.get("given", given)
     if kind == "missing":
         return Problem(path, "nothing", f"a value, it has no default: {description_at(path)}")
     if kind == "too_short":

@@ -2,36 +2,41 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
-from pydantic import Field, field_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
 from casadi_hands.task.fields import Matrix, Positive, Section, Vector, follows, refuse, vector
-from casadi_hands.task.shapes import SECTIONS, Primitive, Shape, spelled
+from casadi_hands.task.mesh import Mesh, MeshRecord, Uniform
+from casadi_hands.task.shapes import SECTIONS, Primitive, Shape, parts_of, spelled
 
 _KINDS = ", ".join(f"`{name}: {spelled(each)}`" for name, each in SECTIONS.items())
 
 
-def _shares(shapes: tuple[Primitive, ...]) -> np.ndarray:
-    volumes = np.array([shape.body.volume for shape in shapes])
-    shares: np.ndarray = volumes / volumes.sum()
-    return shares
+def _solids(shapes: tuple[Primitive, ...]) -> tuple[np.ndarray, list[Uniform]]:
+    """What the object is made of, and the shares (N,) of each in its volume."""
+    solids = [solid for shape in shapes for solid in shape.uniform]
+    volumes = np.array([solid.volume for solid in solids])
+    return volumes / volumes.sum(), solids
 
 
 def _uniform_center(data: dict[str, Any]) -> Vector:
-    shapes = data["shapes"]
-    return vector(_shares(shapes) @ np.array([shape.body.centroid for shape in shapes]))
+    shares, solids = _solids(data["shapes"])
+    return vector(shares @ np.array([solid.centroid for solid in solids]))
 
 
 def _uniform_inertia(data: dict[str, Any]) -> Matrix:
-    shapes, center = data["shapes"], np.array(_uniform_center(data))
-    inertia = np.zeros((3, 3))
-    for share, shape in zip(_shares(shapes), shapes, strict=True):
-        arm = shape.body.centroid - center
-        inertia += share * (shape.body.unit_inertia + (arm @ arm) * np.eye(3) - np.outer(arm, arm))
+    center, inertia = np.array(_uniform_center(data)), np.zeros((3, 3))
+    for share, solid in zip(*_solids(data["shapes"]), strict=True):
+        arm = solid.centroid - center
+        inertia += share * (solid.unit_inertia + (arm @ arm) * np.eye(3) - np.outer(arm, arm))
     x, y, z = data["mass"] * inertia
     return vector(x), vector(y), vector(z)
+
+
+def _records(data: dict[str, Any]) -> tuple[MeshRecord, ...] | None:
+    return tuple(record for shape in data["shapes"] for record in shape.record) or None
 
 
 class ManipulatedObject(Section):
@@ -56,6 +61,27 @@ class ManipulatedObject(Section):
         description="Inertia about the centre of mass, 3 rows of 3, kg·m², axes of the object frame.",
         json_schema_extra={"default": "that of the primitives about their own centre; overlaps count twice"},
     )
+
+    meshes: tuple[MeshRecord, ...] | None = Field(
+        default_factory=follows(_records),
+        description="Meshes of which some of the convex shapes were made; the program writes them.",
+        json_schema_extra={"default": "those among the shapes"},
+    )
+
+    @field_validator("shapes")
+    @classmethod
+    def _cut(cls, shapes: tuple[Any, ...]) -> tuple[Primitive, ...]:
+        try:
+            parts = [parts_of(shape) if isinstance(shape, Mesh) else (shape,) for shape in shapes]
+        except ValidationError:
+            raise refuse("for each mesh an edge_radius smaller than half the least width of its parts") from None
+        return tuple(part for those in parts for part in those)
+
+    @model_validator(mode="after")
+    def _settled(self) -> Self:
+        for shape in self.shapes:
+            shape.on_its_own()
+        return self
 
     @field_validator("inertia")
     @classmethod

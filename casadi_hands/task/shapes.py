@@ -12,6 +12,7 @@ from pydantic import (
     BeforeValidator,
     Discriminator,
     Field,
+    PrivateAttr,
     SerializerFunctionWrapHandler,
     Tag,
     create_model,
@@ -21,6 +22,7 @@ from pydantic import (
 
 from casadi_hands.geometry.bodies import KINDS, Body
 from casadi_hands.task.fields import Positive, Section, Vector, follows, refuse, vector
+from casadi_hands.task.mesh import Mesh, MeshRecord, Uniform
 from casadi_hands.task.rotation import UPRIGHT, Rotation
 
 MOST_POINTS = 500
@@ -29,11 +31,30 @@ MOST_POINTS = 500
 class Primitive(Section):
     """A primitive of the object; its class names the shape."""
 
+    _part_of: tuple[Mesh, int] | None = PrivateAttr(None)
+
     @cached_property
     def body(self) -> Body:
         """The body, m, object frame."""
         kind = KINDS[type(self).__name__.lower()]
         return kind(**{name: _value(getattr(self, name)) for name in type(self).model_fields})
+
+    @property
+    def uniform(self) -> tuple[Uniform, ...]:
+        """What it adds to the object's volume, centre and inertia: itself, or the mesh of which it is a part."""
+        if self._part_of is not None:
+            mesh, number = self._part_of
+            return () if number else (mesh.solid,)
+        return (Uniform(self.body.volume, self.body.centroid, self.body.unit_inertia),)
+
+    @property
+    def record(self) -> tuple[MeshRecord, ...]:
+        """What is told of the mesh of which it is the first part."""
+        return (self._part_of[0].record,) if self._part_of is not None and self._part_of[1] == 0 else ()
+
+    def on_its_own(self) -> None:
+        """Forget of which mesh it is a part, once all that follows from the mesh is known."""
+        self._part_of = None
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
@@ -100,12 +121,12 @@ def spelled(section: Any) -> str:
     return f"{{{', '.join(required)}}}"
 
 
-SECTIONS: dict[str, Any] = {name: _section(kind) for name, kind in KINDS.items()}
+SECTIONS: dict[str, Any] = {**{name: _section(kind) for name, kind in KINDS.items()}, "mesh": Mesh}
 Sphere, Capsule = SECTIONS["sphere"], SECTIONS["capsule"]
 
 
 def _kind(value: Any) -> str | None:
-    if isinstance(value, Primitive):
+    if isinstance(value, Primitive | Mesh):
         return type(value).__name__.lower()
     if isinstance(value, dict) and len(value) == 1:
         return str(next(iter(value)))
@@ -120,3 +141,16 @@ Shape: Any = Annotated[
     reduce(or_, [Annotated[section, BeforeValidator(_content), Tag(name)] for name, section in SECTIONS.items()]),
     Discriminator(_kind),
 ]
+
+
+def parts_of(mesh: Mesh) -> tuple[Primitive, ...]:
+    """Convex shapes that stand for a mesh.
+
+    Raises:
+        ValidationError: one of them cannot have the edge radius.
+    """
+    edge = {} if mesh.edge_radius is None else {"edge_radius": mesh.edge_radius}
+    parts = tuple(SECTIONS["convex"](vertices=[vector(v) for v in part], **edge) for part in mesh.vertices)
+    for number, part in enumerate(parts):
+        part._part_of = (mesh, number)
+    return parts

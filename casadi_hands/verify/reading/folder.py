@@ -166,7 +166,7 @@ def read_folder(directory: str | Path, task: str | Path | None = None) -> Folder
         if not (path / name).is_file():
             raise DesignError(f"{path / name}: missing; the design has no complete motion to check")
     hand, object_file = read_robot(path / "hand.urdf"), read_robot(path / "object.urdf")
-    written = load_task(path / "task.yaml")
+    written = load_task(path / "task.yaml", within=True)
     motion, result = read_motion(path / "motion.npz"), read_record(path / "result.json")
     motors = None if motion.motor_positions is None else motion.motor_positions.shape[1]
     folder = Folder(
