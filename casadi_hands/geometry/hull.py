@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 Array = NDArray[np.float64]
-ALIKE = 1e-7  # of a unit normal, and of the size: faces that differ by less are one
+ALIKE = 1e-4  # of a unit normal, and of the size: faces that differ by less are one
 
 
 @dataclass(frozen=True)
