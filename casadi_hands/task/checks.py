@@ -10,40 +10,23 @@ import numpy as np
 from casadi_hands.task.obstacles import depth_below, depth_in_palm, palm_depth_below
 from casadi_hands.task.problem import Problem
 from casadi_hands.task.task import Task
+from casadi_hands.task.units import wrong_units
 
 # The exponential map of orientations is singular at 360°; beyond this turn it is too close.
 _LARGEST_TURN = 300.0
-# kg/m³: a hundredth of air's, and ten times that of the densest metals; shapes need not be what the object is inside.
-_LIGHTEST, _DENSEST = 0.01, 2e5
 # Depths below this share of the characteristic length are the rounding of numbers typed by hand.
 _TYPED = 1e-3
 
 
 def check(task: Task) -> list[Problem]:
     """Find what contradicts itself in a task whose fields are each valid."""
-    units = list(_units(task))
+    units = list(wrong_units(task))
     if units:  # what follows from them is no second mistake
         return units
     timing = list(_goal_times(task)) + list(_goal_kinds(task)) + list(_other_times(task))
     # Where things stand at the goals says nothing while the goals themselves are in doubt.
     places = [] if timing else list(_turns(task)) + list(_object_places(task)) + list(_palm_places(task))
     return timing + places + list(_contacts(task)) + list(_object_points(task))
-
-
-def _units(task: Task) -> Iterator[Problem]:
-    """Lengths in millimetres and masses in grams, which make an object of no matter there is."""
-    body = task.object
-    volume = sum(shape.body.volume for shape in body.shapes)
-    density, size = body.mass / volume, 2 * body.characteristic_length
-    if density < _LIGHTEST:
-        given = f"an object {size:.3g} m long of {body.mass:.3g} kg, {density:.2g} kg/m³"
-        units = f"lengths in m, masses in kg, of {_LIGHTEST:g} kg/m³ and more"
-        allowed = f"{units}; is the file in millimetres (or centimetres)?"
-        yield Problem(("object", "shapes"), given, allowed)
-    if density > _DENSEST:
-        given = f"{body.mass:.3g} kg for an object {size:.3g} m long, {density:.2g} kg/m³"
-        allowed = f"masses in kg, of {_DENSEST:g} kg/m³ and less; is this one in grams?"
-        yield Problem(("object", "mass"), given, allowed)
 
 
 def _goal_times(task: Task) -> Iterator[Problem]:

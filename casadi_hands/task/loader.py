@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path as FilePath
 
 from pydantic import ValidationError
@@ -12,8 +13,10 @@ from casadi_hands.task.checks import check
 from casadi_hands.task.mesh import FOLDER, WITHIN
 from casadi_hands.task.messages import explain
 from casadi_hands.task.normalise import normalise
-from casadi_hands.task.problem import Problem
+from casadi_hands.task.problem import Problem, Question
+from casadi_hands.task.quaternion_order import wrong_order
 from casadi_hands.task.task import Task
+from casadi_hands.task.units import doubtful_units
 
 
 def load_task(path: str | FilePath, within: bool = False) -> Task:
@@ -30,8 +33,13 @@ def load_task(path: str | FilePath, within: bool = False) -> Task:
     Raises:
         TaskError: the file cannot be read or used; a line for each thing that is wrong.
     """
+    return load_questioned(path, within)[0]
+
+
+def load_questioned(path: str | FilePath, within: bool = False) -> tuple[Task, list[str]]:
+    """Read a task file, like `load_task`, and ask about what it may mean otherwise: a line for each question."""
     path = FilePath(path)
-    return parse_task(yamlfile.read(path), str(path), path.stem, path.parent, within)
+    return parse_questioned(yamlfile.read(path), str(path), path.stem, path.parent, within)
 
 
 def parse_task(
@@ -49,19 +57,32 @@ def parse_task(
     Raises:
         TaskError: as `load_task`.
     """
+    return parse_questioned(text, source, name, folder, within)[0]
+
+
+def parse_questioned(
+    text: str, source: str = "task", name: str = "task", folder: FilePath | None = None, within: bool = False
+) -> tuple[Task, list[str]]:
+    """Build a task from the text of a task file, like `load_questioned`."""
     file = yamlfile.TaskFile(text, source)
     try:
         task = Task.model_validate({"name": name, **file.data}, context={FOLDER: folder, WITHIN: within})
     except ValidationError as error:
         raise _refusal(explain(error.errors(include_url=False)), file) from None
-    problems = check(task)
+    order = list(wrong_order(file.data))
+    problems = check(task) + [each for each in order if isinstance(each, Problem)]
+    questions = [*doubtful_units(task), *(each for each in order if isinstance(each, Question))]
     if not problems:
         task, problems = normalise(task)
     if problems:
         raise _refusal(problems, file)
-    return task
+    return task, _lines(questions, file)
 
 
 def _refusal(problems: list[Problem], file: yamlfile.TaskFile) -> TaskError:
-    lines = sorted((file.line(problem.path), str(problem)) for problem in problems)
-    return TaskError("\n".join(f"{file.source}:{line}: {text}" for line, text in lines))
+    return TaskError("\n".join(_lines(problems, file)))
+
+
+def _lines(found: Sequence[Problem | Question], file: yamlfile.TaskFile) -> list[str]:
+    lines = sorted((file.line(each.path), str(each)) for each in found)
+    return [f"{file.source}:{line}: {text}" for line, text in lines]

@@ -5,31 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from casadi_hands.task.fields import Number, Quadruple, Section, Vector, refuse
-
-# Of a quaternion's length: |w| below the first is a turn of more than 174°, above the second one of less than 90°.
-_HALF_TURN, _SMALL_TURN = 0.05, 0.7072
 
 
 class _Quaternion(Section):
     quaternion: Quadruple = Field(description="[w, x, y, z], object to world; scaled to unit length.")
-
-    @field_validator("quaternion")
-    @classmethod
-    def _order(cls, value: Quadruple) -> Quadruple:
-        """Ask about what is half a turn as written, and would be a small one if the real part were the last number."""
-        w, x, y, z = value
-        size = float(np.linalg.norm(value))
-        if size == 0 or abs(w) > _HALF_TURN * size or abs(z) < _SMALL_TURN * size:
-            return value
-        small, half = (np.degrees(2 * np.arccos(min(abs(real) / size, 1.0))) for real in (z, w))
-        raise refuse(
-            f"[w, x, y, z]; is the order of this one x, y, z, w, a turn by {small:.4g}°? Then write "
-            f"[{z:g}, {w:g}, {x:g}, {y:g}]. If {half:.4g}° are meant: "
-            f"{{axis: [{x:g}, {y:g}, {z:g}], degrees: {half:.4g}}}"
-        )
 
 
 class Rotation(Section):

@@ -345,7 +345,7 @@ SPOILT = {
         # 0.1 kg over π·20²·80 + 4/3·π·20³ = 134041 m³.
         (
             "4: object.shapes: given an object 120 m long of 0.1 kg, 7.5e-07 kg/m³; allowed: lengths in m, masses in "
-            "kg, of 0.01 kg/m³ and more; is the file in millimetres (or centimetres)?"
+            "kg, of 0.1 kg/m³ and more; is the file in millimetres?"
         ),
     ),
     "mass in grams": (
