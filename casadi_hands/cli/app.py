@@ -90,15 +90,15 @@ def solve(
     from casadi_hands.cli.interrupt import leave_on_interrupt
     from casadi_hands.cli.progress import Reporter
     from casadi_hands.cli.summary import alternatives_summary, design_summary
-    from casadi_hands.task import load_task
+    from casadi_hands.task.loader import load_questioned
 
     if start is not None and (seeds > 1 or until is not Stage.REFINE):
         raise typer.BadParameter(
             "one hand is refined, to the end: give neither --seeds nor --until", param_hint="--from"
         )
-    problem = load_task(task)
+    problem, questions = load_questioned(task)
     folder = out or Path("results") / task.stem
-    reporter = Reporter(Console(stderr=True))
+    reporter = Reporter(Console(stderr=True), questions)
 
     def stopped() -> None:
         reporter.stop()
@@ -177,9 +177,9 @@ def formulate(
 def check(task: TaskFile) -> None:
     """Check a task file and print how it is understood; solves nothing. Exits 1 where no hand can do the task."""
     from casadi_hands.cli.task_summary import check_summary
-    from casadi_hands.task import load_task
+    from casadi_hands.task.loader import load_questioned
 
-    text, possible = check_summary(load_task(task))
+    text, possible = check_summary(*load_questioned(task))
     Console().print(text)
     raise typer.Exit(0 if possible else 1)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING
 
@@ -21,16 +22,18 @@ _EVERY = 5.0
 class Reporter:
     """Tells the user how a solve comes along; a context manager, because the terminal must be given back."""
 
-    def __init__(self, console: Console) -> None:
-        """Write to ``console``."""
-        self._console = console
+    def __init__(self, console: Console, questions: Sequence[str] = ()) -> None:
+        """Write to ``console``, first the questions about the task's file."""
+        self._console, self._questions = console, questions
         self._start = time.monotonic()
         self._stage, self._text, self._told = "", "loading", -_EVERY
         self._live = Live(self, console=console, transient=True, refresh_per_second=8)
         self._spinner = Spinner("dots")
 
     def __enter__(self) -> Reporter:
-        """Start the moving line, if there is a terminal to move it on."""
+        """Ask, then start the moving line, if there is a terminal to move it on."""
+        for question in self._questions:
+            self.note(f"is this meant? {question}")
         if self._console.is_terminal:
             self._live.start()
         return self

@@ -10,23 +10,30 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from casadi_hands.diagnosis.impossible import impossibilities
+from casadi_hands.diagnosis.impossible import findings
 from casadi_hands.problem.si import build_model
 from casadi_hands.task import Goal, Task
 
 
-def check_summary(task: Task) -> tuple[RenderableType, bool]:
+def check_summary(task: Task, questions: Sequence[str] = ()) -> tuple[RenderableType, bool]:
     """What `check` prints: every quantity with its unit, lengths in mm, defaults filled in; and why no hand can do it.
 
-    The second says whether one might.
+    Args:
+        task: as loaded.
+        questions: about what its file may mean otherwise, a line each.
+
+    Returns:
+        That, and whether some hand might do the task.
     """
     model = build_model(task)
     table = Table.grid(padding=(0, 2))
     for name, text in _lines(task, model.force_limit):
         table.add_row(Text(name, style="bold"), Text(text))
     title = Text.assemble((task.name, "bold"), f": {' '.join(task.about.split())}" if task.about else "")
-    never = [Text(f"no hand can do this: {reason.text}") for reason in impossibilities(task, model)]
-    return Group(title, table, *never), not never
+    found = findings(task, model)
+    told = [Text(f"is this meant? {question}") for question in questions]
+    told += [Text(f"{'no hand can do this' if each.certain else 'may fail'}: {each.reason.text}") for each in found]
+    return Group(title, table, *told), not any(each.certain for each in found)
 
 
 def _lines(task: Task, force_limit: float) -> Iterator[tuple[str, str]]:

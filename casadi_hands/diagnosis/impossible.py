@@ -1,6 +1,6 @@
-"""What no hand can do, seen from the task alone: told at once, before anything is solved.
+"""What a task shows before anything is solved: what no hand can do, and what is likely a mistake.
 
-Each rule leaves a task some room, so that it speaks only where nothing could be found.
+Each rule leaves a task some room, so that what is certain speaks only where nothing could be found.
 """
 
 from __future__ import annotations
@@ -9,19 +9,36 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-import pinocchio as pin
-from numpy.typing import NDArray
 
+from casadi_hands.diagnosis.finding import Finding, found
+from casadi_hands.diagnosis.fingertips import fingertip_findings
+from casadi_hands.diagnosis.grasps import grasp_findings
 from casadi_hands.diagnosis.moment import moment
+from casadi_hands.diagnosis.places import place_findings
 from casadi_hands.diagnosis.reason import Reason
 from casadi_hands.problem.loads import Load, hardest_load, usual_force_limit
-from casadi_hands.problem.model import Model, palm_from_world
+from casadi_hands.problem.model import Model
 from casadi_hands.task import Task
-from casadi_hands.task.obstacles import depth_in_palm
 from casadi_hands.task.servos import SERVOS
 from casadi_hands.verify.figures.wrench import LEAST_LEVER
 
-Array = NDArray[np.float64]
+_HARD = 5.0  # weights, beyond which a contact presses hard
+_USUAL_LEVER = 1.0  # lengths, of the force on a fingertip about some joint of its finger
+
+
+def findings(task: Task, model: Model) -> list[Finding]:
+    """What is found, what is certain first.
+
+    Args:
+        task: as loaded.
+        model: the same, nondimensional.
+    """
+    places = [*place_findings(task, model), *fingertip_findings(task, model)]
+    forces = [*_too_weak(task, model), *_weak_motors(task, model)]
+    every = [*places, *grasp_findings(task, model), *forces]
+    if not any(each.certain for each in forces):
+        every += _hard(task, model)
+    return sorted(every, key=lambda each: not each.certain)
 
 
 def impossibilities(task: Task, model: Model) -> list[Reason]:
@@ -31,79 +48,10 @@ def impossibilities(task: Task, model: Model) -> list[Reason]:
         task: as loaded.
         model: the same, nondimensional.
     """
-    places = [] if task.palm.may_move else [*_behind(task, model), *_beyond_reach(task, model), *_at_palm(task, model)]
-    return [*places, *_too_weak(task, model), *_weak_motors(task, model)]
+    return [each.reason for each in findings(task, model) if each.certain]
 
 
-def _in_palm(task: Task, model: Model) -> Iterator[tuple[float, Array, Array]]:
-    """Time (s) of every goal, and where the object is then: rotation (3, 3) and position (3,), lengths, palm frame."""
-    for time, position, vector in task.goal_poses():
-        turn, center = palm_from_world(model, time)
-        yield time, turn @ pin.exp3(vector), turn @ (position / model.units.length - center)
-
-
-def _behind(task: Task, model: Model) -> Iterator[Reason]:
-    """The whole object is behind the palm's face at every goal."""
-    highest = []
-    for _, turn, place in _in_palm(task, model):
-        if model.tool is not None:
-            top = float(turn[2] @ model.tool) + _radius_about_tool(task, model)
-        else:
-            top = max(float(np.max(body.support(turn[2]) @ turn[2])) + body.ball for body in model.bodies)
-        highest.append(place[2] + top)
-    if max(highest) < 0:
-        what = (
-            f"the object is behind the palm at every goal, by {_mm(model, -max(highest))} or more: fingers point to "
-            f"{_numbers(task.palm.facing)} (palm.facing), and it is on the other side"
-        )
-        yield Reason(what, f"palm.facing {_numbers([-value for value in task.palm.facing])}", root=True)
-
-
-def _beyond_reach(task: Task, model: Model) -> Iterator[Reason]:
-    """The object's nearest point is farther from the palm than its longest finger reaches."""
-    joints, longest = task.search.max_joints, model.link_length[1]
-    reach = model.palm_radius + joints * longest + model.link_radius
-    distances = []
-    for time, turn, place in _in_palm(task, model):
-        if model.tool is not None:
-            distance = float(np.linalg.norm(place + turn @ model.tool)) - _radius_about_tool(task, model)
-        else:
-            distance = min(body.signed_distance(-turn.T @ place) for body in model.bodies)
-        distances.append((distance, time))
-    distance, time = max(distances)
-    if distance > reach:
-        what = (
-            f"the object is out of reach at {moment(model.schedule, time)}: it is {_mm(model, distance)} from the "
-            f"palm's centre, and a finger of {joints} links of at most {_mm(model, longest)} each, on the palm's rim, "
-            f"reaches {_mm(model, reach)}"
-        )
-        advice = "a palm nearer by (palm.position), longer links (hand.link_length) or more of them (search.max_joints)"
-        yield Reason(what, advice, root=True)
-
-
-def _radius_about_tool(task: Task, model: Model) -> float:
-    """Lengths from a drawing's tool, about which the object may turn, within which all of it is."""
-    assert model.tool is not None
-    farthest = np.linalg.norm(np.maximum(*np.abs(task.object.bounding_box))) / model.units.length
-    return float(np.linalg.norm(model.tool) + farthest)
-
-
-def _at_palm(task: Task, model: Model) -> Iterator[Reason]:
-    """A goal is nearer to a palm that stands still than bodies may be that do not touch."""
-    if task.palm.motion or task.draws:
-        return
-    room = math.sqrt(3) * model.goal_tolerance[0] * model.units.length
-    gaps = [(-depth_in_palm(task.object, place, turn, task.palm), time) for time, place, turn in task.goal_poses()]
-    gap, time = min(gaps)
-    if gap + room < task.hand.clearance:
-        what = (
-            f"the object is {1e3 * max(gap, 0.0):.3g} mm from the palm at {moment(model.schedule, time)}, and bodies "
-            f"that do not touch keep {1e3 * task.hand.clearance:.3g} mm from each other (hand.clearance)"
-        )
-        yield Reason(what, "a goal farther from the palm, or less hand.clearance", root=True)
-
-
-def _too_weak(task: Task, model: Model) -> Iterator[Reason]:
+def _too_weak(task: Task, model: Model) -> Iterator[Finding]:
     """The task allows its contacts less force than bearing its loads takes."""
     given, unit = task.hand.contact_force, model.units.force
     load = None if given is None else hardest_load(model, given)
@@ -115,10 +63,10 @@ def _too_weak(task: Task, model: Model) -> Iterator[Reason]:
         f"{_acting(model, load)}; hand.contact_force allows {given:.3g} ({given * unit:.3g} N)"
     )
     advice = f"hand.contact_force: {usual_force_limit(model):g}, its default here, more friction or more fingers"
-    yield Reason(what, advice, root=True)
+    yield found(what, advice)
 
 
-def _weak_motors(task: Task, model: Model) -> Iterator[Reason]:
+def _weak_motors(task: Task, model: Model) -> Iterator[Finding]:
     """The motors are too weak for the least contact forces, even with the shortest levers that count as actuated."""
     given = task.actuator.torque
     if given is None:
@@ -140,7 +88,33 @@ def _weak_motors(task: Task, model: Model) -> Iterator[Reason]:
     )
     stronger = [name for name, other in SERVOS.items() if other.continuous >= least] if servo else []
     advice = f"a stronger servo ({', '.join(stronger)})" if stronger else "stronger motors (actuator.torque)"
-    yield Reason(what, f"{advice}, a lighter object, more friction or more fingers", root=True)
+    yield found(what, f"{advice}, a lighter object, more friction or more fingers")
+
+
+def _hard(task: Task, model: Model) -> Iterator[Finding]:
+    """A contact must press hard, or motors may be too weak for the levers that fingers usually have."""
+    given = task.actuator.torque
+    enough = _HARD if given is None else min(_HARD, model.torque_limit / _USUAL_LEVER)
+    load = hardest_load(model, enough)
+    if load is None:
+        return
+    name, least = model.contact_table[load.contact].name, load.least * model.units.force
+    what = (
+        f"contact '{name}' must bear at least {load.least:.3g} weights ({least:.3g} N) along an axis of the object at "
+        f"{moment(model.schedule, load.time)} to withstand {_acting(model, load)} at friction {model.friction:g} "
+        f"(friction)"
+    )
+    torque = load.least * _USUAL_LEVER * model.units.torque
+    if given is not None and load.contact < model.contacts and torque > given:
+        what += (
+            f", which takes {torque:.3g} N·m of a joint {1e3 * _USUAL_LEVER * model.units.length:.3g} mm away; motors "
+            f"give {given:.3g} N·m (actuator.torque)"
+        )
+        yield found(what, "stronger motors, a lighter object, more friction or more fingers", certain=False)
+    elif load.least > _HARD:
+        limit = f"{model.force_limit:g} ({model.force_limit * model.units.force:.3g} N)"
+        what += f"; contacts bear at most {limit} (hand.contact_force)"
+        yield found(what, "more friction, more fingers, or weaker perturbations", certain=False)
 
 
 def _acting(model: Model, load: Load) -> str:
@@ -150,11 +124,3 @@ def _acting(model: Model, load: Load) -> str:
     parts = [f"a force of {force:.3g} N"] if force else []
     parts += [f"a torque of {torque:.3g} N·m"] if torque else []
     return f"the task's {' and '.join(part.removeprefix('a ') for part in parts)}" if parts else "its weight"
-
-
-def _mm(model: Model, lengths: float) -> str:
-    return f"{1e3 * lengths * model.units.length:.4g} mm"
-
-
-def _numbers(values: tuple[float, ...] | list[float]) -> str:
-    return f"[{', '.join(f'{value + 0.0:g}' for value in values)}]"

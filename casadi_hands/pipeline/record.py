@@ -25,7 +25,7 @@ class Progress:
     """What a solve is doing.
 
     Attributes:
-        stage: one of ``STAGES``.
+        stage: one of ``STAGES``, or ``check`` for what the task alone shows.
         text: what is tried, and the best so far.
         elapsed: s since the solve began.
     """

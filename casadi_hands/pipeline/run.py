@@ -10,7 +10,7 @@ from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
-from casadi_hands.diagnosis.impossible import impossibilities
+from casadi_hands.diagnosis.impossible import findings
 from casadi_hands.diagnosis.reason import format_reasons
 from casadi_hands.diagnosis.shortcoming import shortcoming_reason
 from casadi_hands.errors import SolveError
@@ -86,8 +86,12 @@ def solve(
         load_mujoco()  # before hours of work, not after them
     jobs = jobs or os.cpu_count() or 1
     record = Record(task, out, progress or (lambda _: None), own_terms)
-    if never := impossibilities(task, model):
+    seen = findings(task, model)
+    if never := [each.reason for each in seen if each.certain]:
         return record.keep(replace(record.design, reason=format_reasons(never)))
+    doubts = format_reasons(each.reason for each in seen)
+    if doubts:
+        record.log("check", doubts)
     with processes(jobs) if executor is None else nullcontext(executor) as workers:
         try:
             design = None if start is None else _refine_again(record, start)
@@ -95,7 +99,10 @@ def solve(
         except SolverError as error:
             _LOG.debug("the solve broke off", exc_info=True)
             design = record.broken_off(error)
-        return record.keep(counted(design))
+        design = counted(design)
+        if doubts and until == STAGES[-1] and design.status != "certified":
+            design = replace(design, reason=f"{design.reason}. The task alone says that {doubts}")
+        return record.keep(design)
 
 
 def _refine_again(record: Record, start: Path) -> Design | None:

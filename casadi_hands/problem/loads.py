@@ -78,35 +78,73 @@ def usual_force_limit(model: Model) -> float:
     return USUAL_FORCE if load is None else float(math.ceil(_ROOM * load.least - 1e-6))
 
 
+@dataclass(frozen=True)
+class Acting:
+    """What acts on the object at a sample, where it stands on the straight way between the goals.
+
+    Attributes:
+        sample: index.
+        disturbed: whether a disturbance of the task is at work.
+        force: (3,) m·g, world, besides gravity.
+        torque: (3,) m·g·length, world.
+        turn: (3, 3) world <- object.
+        needed: (6,) wrench that contacts must make, object frame.
+        grounded: whether the ground may carry.
+    """
+
+    sample: int
+    disturbed: bool
+    force: Array
+    torque: Array
+    turn: Array
+    needed: Array
+    grounded: bool
+
+
+def acting(model: Model) -> Iterator[Acting]:
+    """What acts on the object at the samples, with and without the task's disturbances; what comes twice once."""
+    schedule, seen = model.schedule, set()
+    ways = linear(schedule.keyframes[list(schedule.goals)], schedule.samples)
+    # Goals first, so that what is the same at one and on the way to it is told of the goal.
+    order = [*schedule.goal_samples, *range(len(ways))]
+    reference = pin.Quaternion(*model.reference).matrix()
+    for scenario in model.scenarios:
+        for k in order:
+            turn = pin.exp3(ways[k] @ model.goal_vectors) @ reference
+            force, torque = scenario.force[k], scenario.torque[k]
+            needed = -np.concatenate([turn.T @ (model.gravity + force), turn.T @ torque])
+            place = ways[k] @ model.goal_positions - (0.0 if model.tool is None else turn @ model.tool)
+            grounded = model.ground is not None and bool((place + turn @ model.patches[-1])[2] <= model.ground + _NEAR)
+            # The ground's own normal, and how the object stands on it, change with the turn.
+            key = (*np.round(needed, 9), *(np.round(turn[2], 9) if grounded else ()))
+            if key not in seen:
+                seen.add(key)
+                yield Acting(k, bool(np.any(force) or np.any(torque)), force, torque, turn, needed, grounded)
+
+
+def cones(points: Array, normals: Array, friction: Array, torsion: float, fingers: int) -> tuple[Array, Array]:
+    """Forces (3C, E) and wrenches (6, E) by edge of the circumscribed cones of contacts; the first are of fingers."""
+    forces = spread_forces(normals, friction / math.cos(math.pi / _EDGES), _EDGES)
+    wrenches = grasp_map(points) @ forces
+    if not torsion:
+        return forces, wrenches
+    # Each edge twice, with all of its contact's torsion one way and the other.
+    twist = np.zeros_like(wrenches)
+    twist[3:, : fingers * _EDGES] = torsion * np.repeat(normals[:fingers], _EDGES, axis=0).T
+    return np.tile(forces, (1, 2)), np.hstack([wrenches - twist, wrenches + twist])
+
+
 def _balances(model: Model) -> Iterator[tuple[float, Array, Array, Array, Array, Array]]:
     """Time, force and torque from outside, forces and wrenches by edge, and the wrench that contacts must make.
 
     Forces (3C, E), wrenches (6, E) and the wrench (6,) in the object's frame; what comes twice is given once.
     """
-    schedule, points, seen = model.schedule, model.patches, set()
-    ways = linear(schedule.keyframes[list(schedule.goals)], schedule.samples)
-    normals, friction = inward_normals(points, model.touched), model.frictions / math.cos(math.pi / _EDGES)
-    reference = pin.Quaternion(*model.reference).matrix()
-    for scenario in model.scenarios:
-        for k, way in enumerate(ways):
-            turn = pin.exp3(way @ model.goal_vectors) @ reference
-            force, torque = scenario.force[k], scenario.torque[k]
-            needed = -np.concatenate([turn.T @ (model.gravity + force), turn.T @ torque])
-            place = way @ model.goal_positions - (0.0 if model.tool is None else turn @ model.tool)
-            grounded = model.ground is not None and bool((place + turn @ points[-1])[2] <= model.ground + _NEAR)
-            # The ground's own normal, and how the object stands on it, change with the turn.
-            key = (*np.round(needed, 9), *(np.round(turn[2], 9) if grounded else ()))
-            if key in seen:
-                continue
-            seen.add(key)
-            normals[model.contacts :] = turn[2]
-            count = model.contacts + grounded
-            forces = spread_forces(normals[:count], friction[:count], _EDGES)
-            wrenches = grasp_map(points[:count]) @ forces
-            if model.torsion:
-                # Each edge twice, with all of its contact's torsion one way and the other.
-                twist = np.zeros_like(wrenches)
-                fingers = np.repeat(normals[: model.contacts], _EDGES, axis=0)
-                twist[3:, : len(fingers)] = model.torsion * fingers.T
-                forces, wrenches = np.tile(forces, (1, 2)), np.hstack([wrenches - twist, wrenches + twist])
-            yield float(schedule.samples[k]), force, torque, forces, wrenches, needed
+    points = model.patches
+    normals = inward_normals(points, model.touched)
+    for each in acting(model):
+        normals[model.contacts :] = each.turn[2]
+        count = model.contacts + each.grounded
+        forces, wrenches = cones(
+            points[:count], normals[:count], model.frictions[:count], model.torsion, model.contacts
+        )
+        yield float(model.schedule.samples[each.sample]), each.force, each.torque, forces, wrenches, each.needed

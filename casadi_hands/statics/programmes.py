@@ -44,3 +44,14 @@ def least_largest_solution(
         method="highs",
     )
     return np.asarray(found.x[:count]) if found.status == 0 else None
+
+
+def opposes(forces: Array) -> bool:
+    """Whether some of the forces (3, E), scaled by numbers >= 0 that are not all 0, sum up to none."""
+    found = linprog(
+        np.zeros(forces.shape[1]),
+        A_eq=np.vstack([forces, np.ones(forces.shape[1])]),
+        b_eq=np.array([0.0, 0.0, 0.0, 1.0]),
+        method="highs",
+    )
+    return bool(found.status == 0)

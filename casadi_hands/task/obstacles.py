@@ -39,16 +39,24 @@ def palm_depth_below(palm: Palm, position: np.ndarray, rotation: np.ndarray, hei
     return height - float(position[2] - rim - back)
 
 
-def depth_in_palm(body: ManipulatedObject, position: np.ndarray, vector: np.ndarray, palm: Palm) -> float:
-    """Depth of the object in the palm's disc at the start, m; negative when clear.
+def depth_in_palm(
+    body: ManipulatedObject,
+    position: np.ndarray,
+    vector: np.ndarray,
+    palm: Palm,
+    pose: tuple[np.ndarray, np.ndarray] | None = None,
+) -> float:
+    """Depth of the object in the palm's disc, m; negative when clear.
 
     Args:
         body: the object.
         position: (3,) of its frame, m, world.
         vector: (3,) rotation vector of its frame, rad.
         palm: the palm.
+        pose: position (3,), m, and rotation (3, 3) world <- palm; by default where it starts.
     """
-    to_palm = palm.rotation.T
+    center, rotation = (np.array(palm.position), palm.rotation) if pose is None else pose
+    to_palm = rotation.T
 
     def distance(point: np.ndarray) -> float:
         """Signed distance of the disc and a point (3,) in the palm frame, m."""
@@ -59,7 +67,7 @@ def depth_in_palm(body: ManipulatedObject, position: np.ndarray, vector: np.ndar
     depths = []
     for shape in body.shapes:
         for edge in shape.body.edges():
-            start, end = (to_palm @ (position + rotation @ p - np.array(palm.position)) for p in edge)
+            start, end = (to_palm @ (position + rotation @ p - center) for p in edge)
             depths.append(shape.body.ball - _least(distance, start, end))
     return float(max(depths))
 

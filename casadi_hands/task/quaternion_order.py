@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import math
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -38,7 +39,7 @@ def wrong_order(data: Any) -> Iterator[Problem | Question]:
     for number, (w, x, y, z) in found.items():
         size = float(np.linalg.norm((w, x, y, z)))
         half = abs(w) <= _HALF_TURN * size and abs(z) >= _SMALL_TURN * size
-        if not half and saved < _LIKELIER or abs(z) <= abs(w) or saved <= 0:
+        if (not half and saved < _LIKELIER) or abs(z) <= abs(w) or saved <= 0:
             continue
         as_read, as_written = (np.degrees(turns[number].magnitude()) for turns in (read, written))
         path = ("motion", number, "rotation", "quaternion")
@@ -54,14 +55,11 @@ def wrong_order(data: Any) -> Iterator[Problem | Question]:
             yield Question(path, f"{[w, x, y, z]} is taken as {asked}")
 
 
-def _quaternion(goal: Any) -> tuple[float, float, float, float] | None:
+def _quaternion(goal: Any) -> tuple[float, ...] | None:
     """A goal's quaternion as a file gives it, if it is one."""
     rotation = goal.get("rotation") if isinstance(goal, dict) else None
-    value = rotation.get("quaternion") if isinstance(rotation, dict) else None
-    if not _numbers(value, 4) or not np.any(value):
-        return None
-    w, x, y, z = value
-    return w, x, y, z
+    value = _numbers(rotation.get("quaternion"), 4) if isinstance(rotation, dict) else None
+    return value if value is not None and any(value) else None
 
 
 def _rotations(goal: Any) -> tuple[Turn, Turn]:
@@ -70,16 +68,19 @@ def _rotations(goal: Any) -> tuple[Turn, Turn]:
     if value is not None:
         return Turn.from_quat(value, scalar_first=True), Turn.from_quat(value)
     rotation = goal.get("rotation") if isinstance(goal, dict) else None
-    axis, degrees = (rotation.get(name) for name in ("axis", "degrees")) if isinstance(rotation, dict) else (None, None)
     turn = Turn.identity()
-    if _numbers(axis, 3) and np.any(axis) and isinstance(degrees, int | float) and np.isfinite(degrees):
-        turn = Turn.from_rotvec(np.radians(degrees) * np.array(axis, float) / np.linalg.norm(axis))
+    if isinstance(rotation, dict):
+        axis, degrees = _numbers(rotation.get("axis"), 3), _numbers([rotation.get("degrees")], 1)
+        if axis is not None and any(axis) and degrees is not None:
+            turn = Turn.from_rotvec(np.radians(degrees[0]) * np.array(axis) / np.linalg.norm(axis))
     return turn, turn
 
 
-def _numbers(value: Any, count: int) -> bool:
-    check: Callable[[Any], bool] = lambda x: type(x) in (int, float) and bool(np.isfinite(x))  # noqa: E731
-    return isinstance(value, list) and len(value) == count and all(map(check, value))
+def _numbers(value: Any, count: int) -> tuple[float, ...] | None:
+    """A list of so many finite numbers; None of anything else."""
+    if not isinstance(value, list) or len(value) != count:
+        return None
+    return tuple(value) if all(type(x) in (int, float) and math.isfinite(x) for x in value) else None
 
 
 def _turning(turns: Sequence[Turn]) -> float:

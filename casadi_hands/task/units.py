@@ -1,4 +1,4 @@
-"""Lengths that are not in metres, masses not in kilograms, angles not in degrees: what is so for certain, and likely."""
+"""Lengths not in metres, masses not in kilograms, angles not in degrees: what is so for certain, and likely."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def _other_units(task: Task) -> Iterator[Question]:
 
 
 def _density(task: Task) -> float:
-    return task.object.mass / sum(shape.body.volume for shape in task.object.shapes)
+    return float(task.object.mass) / sum(shape.body.volume for shape in task.object.shapes)
 
 
 def _size(task: Task) -> float:

@@ -1,0 +1,94 @@
+"""Fingertips that have no room where the task has them touch: in each other, the ground, the palm or the object."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import combinations
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from casadi_hands.diagnosis.finding import Finding, found, mm, numbers
+from casadi_hands.diagnosis.patches import nearby
+from casadi_hands.geometry.contact_points import inward_normals
+from casadi_hands.problem.model import Model, palm_from_world
+from casadi_hands.task import Task
+
+Array = NDArray[np.float64]
+_APART = 0.75  # of a link's diameter: stages move contacts apart that overlap by less
+_ROOM = 0.25  # of a link's radius: depths below that are made up for by a little shift of the contact
+_AROUND = math.radians(135)  # between a contact's outward normal and the way back to the palm
+
+
+def fingertip_findings(task: Task, model: Model) -> Iterator[Finding]:
+    """What is wrong with the room of fingertips at the start, where the fingers of a palm touch the object."""
+    normals = -inward_normals(model.patches, model.touched)[: model.contacts]
+    points = model.patches[: model.contacts]
+    yield from _in_each_other(model, points + model.link_radius * normals)
+    if task.draws:
+        return
+    _, position, vector = task.goal_poses()[0]
+    turn, place = pin.exp3(vector), position / model.units.length
+    for index, name in enumerate(model.contact_names):
+        depth, what = _depth(task, model, turn, place, points[index], normals[index])
+        if depth > _ROOM * model.link_radius:
+            near = zip(*nearby(model, points[index]), strict=True)
+            free = any(_depth(task, model, turn, place, p, n)[0] < _ROOM * model.link_radius for p, n in near)
+            text = (
+                f"the fingertip of '{name}', {mm(model, model.link_radius)} in radius (hand.link_radius), is "
+                f"{mm(model, depth)} inside {what} at the start, where it touches the object (fingers.{name}.touches)"
+            )
+            advice = "a contact with room for a fingertip, or thinner links (hand.link_radius)"
+            yield found(text, advice, certain=not free)
+    if not task.palm.may_move:
+        yield from _around(model, turn, normals)
+
+
+def _in_each_other(model: Model, tips: Array) -> Iterator[Finding]:
+    """Two fingertips at their contacts, centres (C, 3), are in each other."""
+    for (i, a), (j, b) in combinations(enumerate(tips), 2):
+        apart, wide = float(np.linalg.norm(a - b)), 2 * model.link_radius
+        if apart < wide:
+            first, second = model.contact_names[i], model.contact_names[j]
+            what = (
+                f"the fingertips of '{first}' and '{second}' overlap by {mm(model, wide - apart)} where they touch the "
+                f"object (fingers.{second}.touches): their centres are {mm(model, apart)} apart, and links are "
+                f"{mm(model, wide)} thick (2 × hand.link_radius)"
+            )
+            radius = 0.5 * apart * model.units.length
+            advice = f"contacts farther apart, or hand.link_radius below {0.98 * radius:.3g}"
+            yield found(what, advice, certain=apart < _APART * wide)
+
+
+def _depth(task: Task, model: Model, turn: Array, place: Array, point: Array, normal: Array) -> tuple[float, str]:
+    """How deep a fingertip at a contact is in what it must not be in, lengths, and what that is."""
+    radius = model.link_radius
+    center = point + radius * normal
+    depths = [(radius - min(body.signed_distance(center) for body in model.bodies), "the object")]
+    world = place + turn @ center
+    if model.ground is not None:
+        depths.append((radius - (float(world[2]) - model.ground), "the ground"))
+    if not task.palm.may_move:
+        to_palm, palm = palm_from_world(model, 0.0)
+        x, y, z = to_palm @ (world - palm)
+        thickness = task.palm.thickness / model.units.length
+        beyond = np.array([np.hypot(x, y) - model.palm_radius, max(z, -thickness - z)])
+        distance = float(np.linalg.norm(np.maximum(beyond, 0)) + min(beyond.max(), 0))
+        depths.append((radius - distance, "the palm"))
+    return max(depths)
+
+
+def _around(model: Model, turn: Array, normals: Array) -> Iterator[Finding]:
+    """Contacts on the far side of the object, seen from the palm."""
+    facing = palm_from_world(model, 0.0)[0][2]
+    for name, normal in zip(model.contact_names, normals, strict=True):
+        angle = math.acos(float(np.clip(-(turn @ normal) @ facing, -1, 1)))
+        if angle > _AROUND:
+            what = (
+                f"finger '{name}' touches the side of the object that is away from the palm, "
+                f"{math.degrees(angle):.0f}° around (fingers.{name}.touches): it must reach around the object and press back toward the palm, "
+                f"against palm.facing {numbers([round(float(value), 2) for value in facing])}"
+            )
+            yield found(what, "a contact on the object's flank, or a palm at another side", certain=False)
