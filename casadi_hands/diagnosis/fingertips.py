@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from casadi_hands.diagnosis.finding import Finding, found, mm, numbers
+from casadi_hands.diagnosis.finding import Finding, found, mm
 from casadi_hands.diagnosis.patches import nearby
 from casadi_hands.geometry.contact_points import inward_normals
 from casadi_hands.problem.model import Model, palm_from_world
@@ -26,40 +26,43 @@ def fingertip_findings(task: Task, model: Model) -> Iterator[Finding]:
     """What is wrong with the room of fingertips at the start, where the fingers of a palm touch the object."""
     normals = -inward_normals(model.patches, model.touched)[: model.contacts]
     points = model.patches[: model.contacts]
-    yield from _in_each_other(model, points + model.link_radius * normals)
+    yield from _in_each_other(model, points, normals)
     if task.draws:
         return
     _, position, vector = task.goal_poses()[0]
     turn, place = pin.exp3(vector), position / model.units.length
-    for index, name in enumerate(model.contact_names):
-        depth, what = _depth(task, model, turn, place, points[index], normals[index])
-        if depth > _ROOM * model.link_radius:
-            near = zip(*nearby(model, points[index]), strict=True)
-            free = any(_depth(task, model, turn, place, p, n)[0] < _ROOM * model.link_radius for p, n in near)
-            text = (
-                f"the fingertip of '{name}', {mm(model, model.link_radius)} in radius (hand.link_radius), is "
-                f"{mm(model, depth)} inside {what} at the start, where it touches the object (fingers.{name}.touches)"
-            )
-            advice = "a contact with room for a fingertip, or thinner links (hand.link_radius)"
-            yield found(text, advice, certain=not free)
+    depths = [_depth(task, model, turn, place, *touch) for touch in zip(points, normals, strict=True)]
+    index = max(range(len(points)), key=lambda i: depths[i][0])
+    (depth, where), name = depths[index], model.contact_names[index]
+    if depth > _ROOM * model.link_radius:
+        near = zip(*nearby(model, points[index]), strict=True)
+        free = any(_depth(task, model, turn, place, *touch)[0] < _ROOM * model.link_radius for touch in near)
+        what = (
+            f"the fingertip of '{name}', {mm(model, model.link_radius)} in radius (hand.link_radius), is "
+            f"{mm(model, depth)} inside {where} at the start, where it touches the object (fingers.{name}.touches)"
+        )
+        advice = "a contact with room for a fingertip, or thinner links (hand.link_radius)"
+        yield found(what, advice, certain=not free)
     if not task.palm.may_move:
         yield from _around(model, turn, normals)
 
 
-def _in_each_other(model: Model, tips: Array) -> Iterator[Finding]:
-    """Two fingertips at their contacts, centres (C, 3), are in each other."""
-    for (i, a), (j, b) in combinations(enumerate(tips), 2):
-        apart, wide = float(np.linalg.norm(a - b)), 2 * model.link_radius
-        if apart < wide:
-            first, second = model.contact_names[i], model.contact_names[j]
-            what = (
-                f"the fingertips of '{first}' and '{second}' overlap by {mm(model, wide - apart)} where they touch the "
-                f"object (fingers.{second}.touches): their centres are {mm(model, apart)} apart, and links are "
-                f"{mm(model, wide)} thick (2 × hand.link_radius)"
-            )
-            radius = 0.5 * apart * model.units.length
-            advice = f"contacts farther apart, or hand.link_radius below {0.98 * radius:.3g}"
-            yield found(what, advice, certain=apart < _APART * wide)
+def _in_each_other(model: Model, points: Array, normals: Array) -> Iterator[Finding]:
+    """Two fingertips at their contacts (C, 3) are in each other; of several pairs the closest."""
+    tips = points + model.link_radius * normals
+    pairs = [(float(np.linalg.norm(tips[i] - tips[j])), i, j) for i, j in combinations(range(len(tips)), 2)]
+    wide = 2 * model.link_radius
+    if not pairs or min(pairs)[0] >= wide:
+        return
+    apart, i, j = min(pairs)
+    first, second = model.contact_names[i], model.contact_names[j]
+    what = (
+        f"the fingertips of '{first}' and '{second}' overlap by {mm(model, wide - apart)} where they touch the object "
+        f"(fingers.{second}.touches): their centres are {mm(model, apart)} apart, and links are {mm(model, wide)} "
+        "thick (2 × hand.link_radius)"
+    )
+    radius = 0.49 * float(np.linalg.norm(points[i] - points[j])) * model.units.length
+    yield found(what, f"contacts farther apart, or hand.link_radius below {radius:.3g}", certain=apart < _APART * wide)
 
 
 def _depth(task: Task, model: Model, turn: Array, place: Array, point: Array, normal: Array) -> tuple[float, str]:
@@ -81,14 +84,13 @@ def _depth(task: Task, model: Model, turn: Array, place: Array, point: Array, no
 
 
 def _around(model: Model, turn: Array, normals: Array) -> Iterator[Finding]:
-    """Contacts on the far side of the object, seen from the palm."""
+    """A contact on the far side of the object, seen from the palm; of several the one farthest around."""
     facing = palm_from_world(model, 0.0)[0][2]
-    for name, normal in zip(model.contact_names, normals, strict=True):
-        angle = math.acos(float(np.clip(-(turn @ normal) @ facing, -1, 1)))
-        if angle > _AROUND:
-            what = (
-                f"finger '{name}' touches the side of the object that is away from the palm, "
-                f"{math.degrees(angle):.0f}° around (fingers.{name}.touches): it must reach around the object and press back toward the palm, "
-                f"against palm.facing {numbers([round(float(value), 2) for value in facing])}"
-            )
-            yield found(what, "a contact on the object's flank, or a palm at another side", certain=False)
+    angles = [math.acos(float(np.clip(-(turn @ normal) @ facing, -1, 1))) for normal in normals]
+    name, angle = model.contact_names[int(np.argmax(angles))], max(angles)
+    if angle > _AROUND:
+        what = (
+            f"finger '{name}' touches the side of the object that is away from the palm, {math.degrees(angle):.0f}° "
+            f"around (fingers.{name}.touches): it must reach around the object and press back toward the palm"
+        )
+        yield found(what, "a contact on the object's flank, or a palm at another side (palm.position)", certain=False)

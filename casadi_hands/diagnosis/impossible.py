@@ -27,7 +27,7 @@ _USUAL_LEVER = 1.0  # lengths, of the force on a fingertip about some joint of i
 
 
 def findings(task: Task, model: Model) -> list[Finding]:
-    """What is found, what is certain first.
+    """What is found: what is certain, or if nothing is, what is likely.
 
     Args:
         task: as loaded.
@@ -36,9 +36,8 @@ def findings(task: Task, model: Model) -> list[Finding]:
     places = [*place_findings(task, model), *fingertip_findings(task, model)]
     forces = [*_too_weak(task, model), *_weak_motors(task, model)]
     every = [*places, *grasp_findings(task, model), *forces]
-    if not any(each.certain for each in forces):
-        every += _hard(task, model)
-    return sorted(every, key=lambda each: not each.certain)
+    # Beside what is certain, the likely may follow from it.
+    return [each for each in every if each.certain] or [*every, *_hard(task, model)]
 
 
 def impossibilities(task: Task, model: Model) -> list[Reason]:

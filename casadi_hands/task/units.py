@@ -20,7 +20,7 @@ _TINY = 0.005  # m: the shape may stand for a tip of something larger
 _STRONG = 100.0  # m/s²
 _LENGTHS = {"millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254}
 _MASSES = {"": 1.0, " and grams": 1e-3}
-_LIKELY_DENSITY, _LIKELY_SIZE = (30.0, 2e4), (0.003, 0.5)  # of what hands hold
+_LIKELY_DENSITY, _LIKELY_SIZE = (100.0, 2e4), (0.003, 0.5)  # of what hands hold
 
 
 def wrong_units(task: Task) -> Iterator[Problem]:
@@ -52,14 +52,19 @@ def doubtful_units(task: Task) -> Iterator[Question]:
     elif density > _METAL:
         what = f"{task.object.mass:.3g} kg for an object {size:.3g} m long is denser than metals, {density:.2g} kg/m³"
         yield Question(("object", "mass"), f"{what}; is the mass in grams?")
-    if far > max(_FAR, 2 * size):
+    if size <= _LARGE and far > max(_FAR, 2 * size):
         what = f"the palm is {far:.3g} m from the object, {far / size:.0f} times its length"
         yield Question(("palm", "position"), f"{what}; {_asked_of(far)}")
-    long = {"palm.radius": task.palm.radius, "hand.link_radius": task.hand.link_radius}
-    long["hand.link_length"] = task.hand.link_length[1] if far <= _FAR else 0.0  # its default follows from the distance
-    for name, length in long.items():
-        if length > max(_LARGE, 2 * size):
-            yield Question(tuple(name.split(".")), f"this is {length:.3g} m; {_asked_of(length)}")
+    # What hand they belong to: the defaults of these follow from lengths that are asked about themselves.
+    palm, hand = task.palm, task.hand
+    usual = max(_LARGE, 2 * (far + size))
+    for path, length, most in (
+        (("palm", "radius"), palm.radius, usual),
+        (("hand", "link_radius"), hand.link_radius, max(usual, palm.radius)),
+        (("hand", "link_length"), hand.link_length[1], usual + 2 * palm.radius),
+    ):
+        if length > most:
+            yield Question(path, f"this is {length:.3g} m, for an object {size:.3g} m long; {_asked_of(length)}")
     yield from _other_units(task)
 
 
@@ -82,7 +87,7 @@ def _other_units(task: Task) -> Iterator[Question]:
 
 
 def _density(task: Task) -> float:
-    return float(task.object.mass) / sum(shape.body.volume for shape in task.object.shapes)
+    return task.object.mass / float(sum(shape.body.volume for shape in task.object.shapes))
 
 
 def _size(task: Task) -> float:
@@ -103,7 +108,7 @@ def _asked(task: Task) -> str:
             likely = _LIKELY_DENSITY[0] <= density * kilograms / metres**3 <= _LIKELY_DENSITY[1]
             if likely and _LIKELY_SIZE[0] <= size * metres <= _LIKELY_SIZE[1]:
                 readings.append(f"{length}{mass}")
-    return f"is the file in {' or '.join(readings)}?" if readings else "is the file in millimetres (or centimetres)?"
+    return f"is the file in {', or '.join(readings)}?" if readings else "is the file in millimetres (or centimetres)?"
 
 
 def _asked_of(length: float) -> str:
