@@ -32,3 +32,11 @@ def test_a_nonnegative_fit_is_as_near_as_can_be(gives_up: bool, monkeypatch: pyt
         assert (x >= 0).all()
         assert missing == pytest.approx(np.linalg.norm(matrix @ x - wanted), rel=1e-9)
         assert missing == pytest.approx(np.sqrt(found.fun), rel=1e-6)
+
+
+def test_forces_oppose_each_other_where_no_direction_has_a_part_of_all() -> None:
+    push = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    assert not programmes.opposes(push)
+    assert not programmes.opposes(np.array([[1.0, -1.0], [0.1, 0.1], [0.0, 0.0]]))
+    assert programmes.opposes(np.array([[1.0, -2.0], [0.0, 0.0], [0.0, 0.0]]))
+    assert programmes.opposes(np.column_stack([push, [-1.0, -1.0, -1.0]]))
