@@ -13,7 +13,8 @@ from casadi_hands.diagnosis.patches import nearby
 from casadi_hands.geometry.contact_points import inward_normals
 from casadi_hands.problem.loads import HELD, Acting, acting, cones
 from casadi_hands.problem.model import Model, palm_from_world
-from casadi_hands.statics.programmes import nonnegative_fit, opposes
+from casadi_hands.statics.grasp import EDGES, friction_edges, torsion_edges
+from casadi_hands.statics.programmes import least_missing, nonnegative_fit, opposes
 from casadi_hands.task import Task
 
 Array = NDArray[np.float64]
@@ -23,7 +24,7 @@ _BETTER = "contacts that surround the object better or oppose each other"
 
 
 def grasp_findings(task: Task, model: Model) -> Iterator[Finding]:
-    """What the contacts cannot hold, by least-squares fits over the forces in their friction cones."""
+    """What the contacts cannot hold, by least squares and linear programmes over the forces in their friction cones."""
     if model.contacts == 1:
         single = list(_single(task, model))
         if single:
@@ -61,18 +62,16 @@ def _single(task: Task, model: Model) -> Iterator[Finding]:
 def _one_sided(model: Model) -> Iterator[Finding]:
     """All contacts push to one side, so that the object never comes to rest again."""
     normals = inward_normals(model.patches, model.touched)
-    forces, _ = cones(model.patches, normals, model.frictions, 0.0, model.contacts)
-    sums = np.sum(forces.reshape(model.contacts, 3, -1), axis=0)
-    if opposes(sums):
+    if opposes(_wrenches(model.patches, normals, model.friction)[:3]):
         return
     near = [nearby(model, point) for point in model.patches]
-    points, inward = (np.vstack([each[side] for each in near]) for side in (0, 1))
-    wide, _ = cones(points, -inward, np.full(len(points), model.friction), 0.0, len(points))
+    points, outward = (np.vstack([each[side] for each in near]) for side in (0, 1))
+    certain = not opposes(_wrenches(points, -outward, model.friction)[:3])
     what = (
         "nothing stops the object: all fingers push it to one side (fingers), none pushes back, and it must start and "
         "end at rest"
     )
-    yield found(what, _BETTER, certain=not opposes(np.sum(wide.reshape(len(points), 3, -1), axis=0)))
+    yield found(what, _BETTER, certain)
 
 
 def _lost(task: Task, model: Model) -> Iterator[Finding]:
@@ -86,7 +85,7 @@ def _lost(task: Task, model: Model) -> Iterator[Finding]:
         time = float(model.schedule.samples[each.sample])
         # Of a drawing's object, and of one between goals, the task does not say how it stands.
         stands = not task.draws and (disturbed or goal_at(model.schedule, time) is not None)
-        certain = stands and float(np.linalg.norm(_missing(model, each, wide=True))) > HELD
+        certain = stands and not _held_nearby(model, each)
         missing = _missing(model, each)
         where = f"wherever within {mm(model, WANDER)} of there they touch" if certain else "where they touch (touches)"
         what = (
@@ -100,21 +99,31 @@ def _lost(task: Task, model: Model) -> Iterator[Finding]:
         return
 
 
-def _missing(model: Model, load: Acting, friction: float | None = None, wide: bool = False) -> Array:
-    """(6,) wrench that contacts cannot make of a load, where the task puts them or, if ``wide``, all about there."""
-    points, bodies, mu = model.patches, model.touched, model.frictions
-    normals, fingers = inward_normals(points, bodies), model.contacts
+def _missing(model: Model, load: Acting, friction: float | None = None) -> Array:
+    """(6,) wrench that contacts cannot make of a load where the task puts them."""
+    points, mu, count = model.patches, model.frictions, model.contacts + load.grounded
+    normals = inward_normals(points, model.touched)
+    normals[model.contacts :] = load.turn[2]
     if friction is not None:
-        mu[:fingers] = friction
-    normals[fingers:] = load.turn[2]
-    if wide:
-        places = [nearby(model, center) for i in range(fingers) for center in _centers(model, load, i)]
-        near, outward = (np.vstack([place[side] for place in places]) for side in (0, 1))
-        points, normals = np.vstack([near, points[fingers:]]), np.vstack([-outward, normals[fingers:]])
-        mu, fingers = np.concatenate([np.full(len(near), mu[0]), mu[fingers:]]), len(near)
-    count = fingers + load.grounded
-    _, wrenches = cones(points[:count], normals[:count], mu[:count], model.torsion, fingers)
+        mu[: model.contacts] = friction
+    _, wrenches = cones(points[:count], normals[:count], mu[:count], model.torsion, model.contacts)
     return load.needed - wrenches @ nonnegative_fit(wrenches, load.needed)[0]
+
+
+def _held_nearby(model: Model, load: Acting) -> bool:
+    """Whether a load may be borne if each contact were at all places at once that it may be moved to."""
+    places = [nearby(model, center) for i in range(model.contacts) for center in _centers(model, load, i)]
+    points, outward = (np.vstack([place[side] for place in places]) for side in (0, 1))
+    wrenches = [_wrenches(points, -outward, model.friction), torsion_edges(points, -outward, model.torsion)]
+    if load.grounded:
+        wrenches.append(_wrenches(model.patches[-1:], load.turn[2:], float(model.frictions[-1])))
+    return least_missing(np.hstack(wrenches), load.needed) <= HELD
+
+
+def _wrenches(points: Array, normals: Array, friction: float) -> Array:
+    """(6, 8K) of unit normal forces on the edges of circumscribed friction cones at points (K, 3)."""
+    edges = friction_edges(normals, np.full(len(points), friction / np.cos(np.pi / EDGES)))
+    return np.vstack([edges, np.cross(np.repeat(points, EDGES, axis=0), edges.T).T])
 
 
 def _centers(model: Model, load: Acting, contact: int) -> list[Array]:

@@ -11,7 +11,7 @@ from casadi_hands.diagnosis.finding import WANDER
 from casadi_hands.problem.model import Model
 
 Array = NDArray[np.float64]
-_RINGS = (0.25, 0.5, 0.75, 1.0)  # of WANDER
+_RINGS = (0.35, 0.7, 1.0)  # of WANDER
 _WAYS = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
 _WAYS /= np.linalg.norm(_WAYS, axis=1)[:, None]
 

@@ -46,6 +46,18 @@ def least_largest_solution(
     return np.asarray(found.x[:count]) if found.status == 0 else None
 
 
+def least_missing(wrenches: Array, wanted: Array) -> float:
+    """The least over x >= 0 of the largest component of ``|wrenches @ x - wanted|``."""
+    slack = -np.ones((len(wanted), 1))
+    found = linprog(
+        np.append(np.zeros(wrenches.shape[1]), 1.0),
+        A_ub=np.vstack([np.hstack([wrenches, slack]), np.hstack([-wrenches, slack])]),
+        b_ub=np.concatenate([wanted, -wanted]),
+        method="highs",
+    )
+    return float(found.fun) if found.status == 0 else float("inf")
+
+
 def opposes(forces: Array) -> bool:
     """Whether some of the forces (3, E), scaled by numbers >= 0 that are not all 0, sum up to none."""
     found = linprog(

@@ -40,3 +40,11 @@ def test_forces_oppose_each_other_where_no_direction_has_a_part_of_all() -> None
     assert not programmes.opposes(np.array([[1.0, -1.0], [0.1, 0.1], [0.0, 0.0]]))
     assert programmes.opposes(np.array([[1.0, -2.0], [0.0, 0.0], [0.0, 0.0]]))
     assert programmes.opposes(np.column_stack([push, [-1.0, -1.0, -1.0]]))
+
+
+def test_the_least_missing_is_the_distance_of_the_cone_in_the_largest_component() -> None:
+    edges = np.array([[1.0, 0.0], [0.0, 1.0]])
+    assert programmes.least_missing(edges, np.array([2.0, 3.0])) == pytest.approx(0.0, abs=1e-9)
+    assert programmes.least_missing(edges, np.array([2.0, -3.0])) == pytest.approx(3.0)
+    # The nearest on the ray through (1, 1) to (3, 1) is (2, 2).
+    assert programmes.least_missing(np.array([[1.0], [1.0]]), np.array([3.0, 1.0])) == pytest.approx(1.0)
