@@ -117,7 +117,7 @@ def _held_nearby(model: Model, load: Acting) -> bool:
     wrenches = [_wrenches(points, -outward, model.friction), torsion_edges(points, -outward, model.torsion)]
     if load.grounded:
         wrenches.append(_wrenches(model.patches[-1:], load.turn[2:], float(model.frictions[-1])))
-    return least_missing(np.hstack(wrenches), load.needed) <= HELD
+    return least_missing(np.hstack(wrenches), load.needed, HELD) <= HELD
 
 
 def _wrenches(points: Array, normals: Array, friction: float) -> Array:

@@ -59,7 +59,8 @@ def _too_weak(task: Task, model: Model) -> Iterator[Finding]:
     what = (
         f"contact '{model.contact_table[load.contact].name}' must bear at least {load.least:.3g} weights "
         f"({load.least * unit:.3g} N) along an axis of the object at {moment(model.schedule, load.time)} to withstand "
-        f"{_acting(model, load)}; hand.contact_force allows {given:.3g} ({given * unit:.3g} N)"
+        f"{_acting(model, load)} at friction {model.friction:g} (friction); hand.contact_force allows "
+        f"{given:.3g} ({given * unit:.3g} N)"
     )
     advice = f"hand.contact_force: {usual_force_limit(model):g}, its default here, more friction or more fingers"
     yield found(what, advice)

@@ -11,23 +11,28 @@ from casadi_hands.diagnosis.finding import WANDER
 from casadi_hands.problem.model import Model
 
 Array = NDArray[np.float64]
-_RINGS = (0.35, 0.7, 1.0)  # of WANDER
+_RINGS = (0.5, 1.0)  # of WANDER
+_SAME = 0.15, 0.4  # lengths, and parts of a unit normal
 _WAYS = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
 _WAYS /= np.linalg.norm(_WAYS, axis=1)[:, None]
 
 
 def nearby(model: Model, center: Array) -> tuple[Array, Array]:
-    """Points (K, 3) of the object's surface within ``WANDER`` of a point (3,), and their outward normals (K, 3)."""
-    points, normals = [], []
+    """Points (K, 3) within ``WANDER`` of a point (3,) on the surfaces of its bodies, and their outward normals (K, 3).
+
+    Those of a body that are inside another are among them: what asks for all that might be is wider by them.
+    """
+    found = []
     for body in model.bodies:
         if body.signed_distance(center) > WANDER:
             continue
-        for start in [center, *(center + WANDER * ring * way for ring in _RINGS for way in _WAYS)]:
+        for start in (center, *(center + WANDER * ring * way for ring in _RINGS for way in _WAYS)):
             point = body.on_surface(start)
-            if body.has_normal(start) and np.linalg.norm(point - center) <= WANDER + 1e-9:
-                points.append(point)
-                normals.append(body.outward(start))
-    if not points:
-        return np.zeros((0, 3)), np.zeros((0, 3))
-    outside = [min(body.signed_distance(point) for body in model.bodies) > -1e-6 for point in points]
-    return np.array(points)[outside], np.array(normals)[outside]
+            if np.linalg.norm(point - center) <= WANDER + 1e-9:
+                found.append((point, body.outward(start)))
+    points, normals = (np.array([each[side] for each in found]).reshape(-1, 3) for side in (0, 1))
+    # Of those that are much the same, one; none where a surface has no normal.
+    alike = np.round(np.hstack([points / _SAME[0], normals / _SAME[1]]))
+    chosen = np.sort(np.unique(alike, axis=0, return_index=True)[1])
+    chosen = chosen[np.linalg.norm(normals[chosen], axis=1) > 0.5]
+    return points[chosen], normals[chosen]

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog, lsq_linear, nnls
 
 Array = NDArray[np.float64]
+_TAKEN = 12  # columns at a time
 
 
 def nonnegative_fit(matrix: Array, wanted: Array) -> tuple[Array, float]:
@@ -46,16 +47,25 @@ def least_largest_solution(
     return np.asarray(found.x[:count]) if found.status == 0 else None
 
 
-def least_missing(wrenches: Array, wanted: Array) -> float:
-    """The least over x >= 0 of the largest component of ``|wrenches @ x - wanted|``."""
-    slack = -np.ones((len(wanted), 1))
-    found = linprog(
-        np.append(np.zeros(wrenches.shape[1]), 1.0),
-        A_ub=np.vstack([np.hstack([wrenches, slack]), np.hstack([-wrenches, slack])]),
-        b_ub=np.concatenate([wanted, -wanted]),
-        method="highs",
-    )
-    return float(found.fun) if found.status == 0 else float("inf")
+def least_missing(matrix: Array, wanted: Array, enough: float = 1e-9) -> float:
+    """The distance of ``nonnegative_fit`` of a matrix of many columns, which are taken in as they help.
+
+    Args:
+        matrix: (n, many).
+        wanted: (n,).
+        enough: distance that is not made any less.
+    """
+    taken, missing = np.zeros(0, int), wanted
+    while np.linalg.norm(missing) > enough:
+        helps = missing @ matrix
+        helps[taken] = 0.0
+        more = np.argsort(-helps)[:_TAKEN]
+        more = more[helps[more] > 1e-12]
+        if not len(more):
+            break
+        taken = np.append(taken, more)
+        missing = wanted - matrix[:, taken] @ nonnegative_fit(matrix[:, taken], wanted)[0]
+    return float(np.linalg.norm(missing))
 
 
 def opposes(forces: Array) -> bool:

@@ -114,7 +114,8 @@ def test_a_limit_of_contact_forces_that_the_task_s_torque_exceeds() -> None:
     least = 20 / WEIGHT
     (text,) = told(more=push + f"hand: {{contact_force: {0.99 * least}}}")
     assert "must bear at least 20.3 weights (19.9 N) along an axis of the object at 1.05 s (between" in text
-    assert "to withstand the task's torque of 0.6 N·m; hand.contact_force allows 20.2 (19.8 N); try" in text
+    assert "to withstand the task's torque of 0.6 N·m at friction 0.5 (friction)" in text
+    assert "; hand.contact_force allows 20.2 (19.8 N); try" in text
     assert "hand.contact_force: 82, its default here" in text
     assert told(more=push + f"hand: {{contact_force: {1.01 * least}}}") == []
     assert told(more=push) == []

@@ -42,9 +42,14 @@ def test_forces_oppose_each_other_where_no_direction_has_a_part_of_all() -> None
     assert programmes.opposes(np.column_stack([push, [-1.0, -1.0, -1.0]]))
 
 
-def test_the_least_missing_is_the_distance_of_the_cone_in_the_largest_component() -> None:
-    edges = np.array([[1.0, 0.0], [0.0, 1.0]])
-    assert programmes.least_missing(edges, np.array([2.0, 3.0])) == pytest.approx(0.0, abs=1e-9)
-    assert programmes.least_missing(edges, np.array([2.0, -3.0])) == pytest.approx(3.0)
+def test_a_fit_of_many_columns_is_the_fit_of_all_of_them() -> None:
+    rng = np.random.default_rng(1)
+    for part in (1.0, 0.2):  # of the sphere that columns point to: to all sides, and to one
+        for _ in range(5):
+            matrix, wanted = rng.normal(size=(6, 500)), rng.normal(size=6)
+            matrix[0] = np.abs(matrix[0]) / part
+            missing = programmes.least_missing(matrix, wanted)
+            assert missing == pytest.approx(programmes.nonnegative_fit(matrix, wanted)[1], abs=1e-8)
+            assert programmes.least_missing(matrix, wanted, missing + 0.1) <= missing + 0.1
     # The nearest on the ray through (1, 1) to (3, 1) is (2, 2).
-    assert programmes.least_missing(np.array([[1.0], [1.0]]), np.array([3.0, 1.0])) == pytest.approx(1.0)
+    assert programmes.least_missing(np.ones((2, 1)), np.array([3.0, 1.0])) == pytest.approx(np.sqrt(2))
