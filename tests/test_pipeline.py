@@ -152,19 +152,23 @@ def farthest_contact(text: str, contact: int) -> float:
     return float(np.hypot(np.maximum(np.hypot(points[:, 0], points[:, 1]) - 0.06, 0), points[:, 2] - FOOT).max())
 
 
-@pytest.mark.parametrize(
-    ("changes", "link", "names"),
-    [
-        # Two links of 2 cm do not span 9 cm.
-        (["hand: {link_length: [0.016, 0.02]}"], 0.02, ("goal 1 (0 s)", "goal 2 (0.6 s)")),
-        # A second goal 19 cm from the palm for fingers of 10 cm.
-        (["hand: {link_length: [0.016, 0.05]}", "[0, 0.015, 0.09] -> [0, 0.17, 0.09]"], 0.05, ("goal 2 (0.6 s)",)),
-    ],
-)
-def test_a_contact_out_of_reach_fails_the_task(
-    changes: list[str], link: float, names: tuple[str, ...], tmp_path: Path
-) -> None:
-    text = changed(*changes)
+def test_a_contact_out_of_reach_at_the_start_fails_the_task_at_once() -> None:
+    # Two links of 2 cm do not span 9 cm: from (0, 60, 8.19) mm to (0, 30, 90) mm.
+    design = solve(parse_task(changed("hand: {link_length: [0.016, 0.02]}")), jobs=1)
+    assert design.status == "failed"
+    assert design.stages == []
+    far = 1e3 * np.hypot(0.03, 0.09 - FOOT)
+    for finger in ("left", "right"):
+        assert f"finger '{finger}' cannot reach its contact at goal 1 (0 s): that is {far:.4g} mm from" in design.reason
+    assert (
+        design.reason.count(f"a finger of 2 links of at most 20 mm each reaches {40 + 1e3 * RADIUS:.4g} mm; try") == 2
+    )
+
+
+def test_a_contact_out_of_reach_fails_the_task(tmp_path: Path) -> None:
+    # A second goal 19 cm from the palm for fingers of 10 cm.
+    link, names = 0.05, ("goal 2 (0.6 s)",)
+    text = changed("hand: {link_length: [0.016, 0.05]}", "[0, 0.015, 0.09] -> [0, 0.17, 0.09]")
     (tmp_path / "task.yaml").write_text(text)
     result = CliRunner().invoke(
         app, ["solve", str(tmp_path / "task.yaml"), "--out", str(tmp_path / "out"), "--jobs", "1"]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from casadi_hands.diagnosis.finding import WANDER, Finding, found, mm, numbers
 from casadi_hands.diagnosis.moment import moment
+from casadi_hands.kinematics import STAND
 from casadi_hands.problem.model import Model, palm_from_world
 from casadi_hands.task import Task
 from casadi_hands.task.obstacles import depth_in_palm
@@ -111,13 +112,13 @@ def _touches_beyond_reach(task: Task, model: Model) -> Iterator[Finding]:
     time, turn, place = next(iter(_in_palm(task, model)))
     for name, point in zip(model.contact_names, model.patches, strict=False):
         x, y, z = place + turn @ point
-        distance = float(np.hypot(np.hypot(x, y) - model.palm_radius, z))
+        distance = float(np.hypot(np.hypot(x, y) - model.palm_radius, z - STAND * model.link_radius))
         nearest = min(body.signed_distance(-turn.T @ place) for body in model.bodies)
         if distance > length and nearest <= model.palm_radius + length:
             what = (
                 f"finger '{name}' cannot reach its contact at {moment(model.schedule, time)}: that is "
-                f"{mm(model, distance)} from the palm's rim (fingers.{name}.touches), and {finger} reaches "
-                f"{mm(model, length)}"
+                f"{mm(model, distance)} from the nearest place for its first joint on the palm's rim "
+                f"(fingers.{name}.touches), and {finger} reaches {mm(model, length)}"
             )
             yield found(what, _NEARER, certain=distance - WANDER > length)
 

@@ -60,8 +60,8 @@ MISTAKES = {
             ("0.19]", "0.19], rotation: {quaternion: [0, 0, 0, 1]}"),
         ],
         2,
-        "5: motion[0].rotation.quaternion: given [0, 0, 0, 1]; allowed: [w, x, y, z]; is the order of this one x, y, z, "
-        "w, a turn by 0°? Then write [1, 0, 0, 0]",
+        "5: motion[0].rotation.quaternion: given [0, 0, 0, 1]; allowed: [w, x, y, z]; is the order of this one x, y, "
+        "z, w, a turn by 0°? Then write [1, 0, 0, 0]",
     ),
     "a bound on forces": (
         [("fingers:", "perturbations: [{from: 0, to: 2, torque: [0, 0, -0.3]}]\nhand: {contact_force: 15}\nfingers:")],

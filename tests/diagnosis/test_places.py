@@ -77,6 +77,7 @@ def test_a_contact_farther_from_the_rim_than_a_finger_is_long() -> None:
     hand = "hand: {link_length: [0.02, 0.04], link_radius: 0.003432}\nsearch: {max_joints: 1}"
     found = seen(wide, [AT, AT], more=hand)
     assert found[0].certain
-    # From the rim at 80 mm to (22, 0, -100) mm: √(58² + 100²) = 115.6 mm.
-    assert "that is 115.6 mm from the palm's rim (fingers.f0.touches)" in found[0].reason.what
+    # From the rim at 80 mm, 1.05 tips below the palm, to (22, 0, -100) mm: √(58² + 96.4²) = 112.5 mm.
+    assert "that is 112.5 mm from the nearest place for its first joint on the palm's rim" in found[0].reason.what
+    assert "(fingers.f0.touches), and a finger of 1 links of" in found[0].reason.what
     assert found[0].reason.what.endswith("reaches 43.43 mm")
