@@ -18,7 +18,8 @@ from casadi_hands.geometry.bodies import Body
 from casadi_hands.task import Task, parse_task
 from casadi_hands.task.object import ManipulatedObject
 from casadi_hands.task.rotation import UPRIGHT, Rotation, rotation_matrix
-from casadi_hands.task.yamlfile import TaskFile, read
+from casadi_hands.task.textfile import read
+from casadi_hands.task.yamlfile import TaskFile
 
 SIZE, MASS, GOAL, TURN, CONTACT = 0.2, 0.3, 0.2, 0.2, 15.0
 """Largest change: shares, and degrees for contacts."""

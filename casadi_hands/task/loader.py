@@ -8,15 +8,20 @@ from pathlib import Path as FilePath
 from pydantic import ValidationError
 
 from casadi_hands.errors import TaskError
-from casadi_hands.task import yamlfile
+from casadi_hands.task.bounds import bound, bound_samples
 from casadi_hands.task.checks import check
 from casadi_hands.task.mesh import FOLDER, WITHIN
 from casadi_hands.task.messages import explain
 from casadi_hands.task.normalise import normalise
 from casadi_hands.task.problem import Problem, Question
 from casadi_hands.task.quaternion_order import wrong_order
+from casadi_hands.task.shown import joined, printable
 from casadi_hands.task.task import Task
+from casadi_hands.task.textfile import file_name, read
 from casadi_hands.task.units import doubtful_units
+from casadi_hands.task.yamlfile import TaskFile
+
+_MOST = 50  # mistakes that are looked at; a message has room for fewer
 
 
 def load_task(path: str | FilePath, within: bool = False) -> Task:
@@ -39,7 +44,7 @@ def load_task(path: str | FilePath, within: bool = False) -> Task:
 def load_questioned(path: str | FilePath, within: bool = False) -> tuple[Task, list[str]]:
     """Read a task file, like `load_task`, and ask about what it may mean otherwise: a line for each question."""
     path = FilePath(path)
-    return parse_questioned(yamlfile.read(path), str(path), path.stem, path.parent, within)
+    return parse_questioned(read(path), file_name(path), printable(path.stem), path.parent, within)
 
 
 def parse_task(
@@ -64,13 +69,17 @@ def parse_questioned(
     text: str, source: str = "task", name: str = "task", folder: FilePath | None = None, within: bool = False
 ) -> tuple[Task, list[str]]:
     """Build a task from the text of a task file, like `load_questioned`."""
-    file = yamlfile.TaskFile(text, source)
+    file = TaskFile(text, source)
+    problems = bound(file.data)
+    if problems:
+        raise _refusal(problems, file)
     try:
         task = Task.model_validate({"name": name, **file.data}, context={FOLDER: folder, WITHIN: within})
     except ValidationError as error:
-        raise _refusal(explain(error.errors(include_url=False)), file) from None
+        errors = sorted(error.errors(include_url=False), key=lambda each: file.line(each["loc"]))
+        raise _refusal(explain(errors[:_MOST]), file, len(errors[_MOST:])) from None
     order = list(wrong_order(file.data))
-    problems = check(task) + [each for each in order if isinstance(each, Problem)]
+    problems = bound_samples(task) or check(task) + [each for each in order if isinstance(each, Problem)]
     questions = [*doubtful_units(task), *(each for each in order if isinstance(each, Question))]
     if not problems:
         task, problems = normalise(task)
@@ -79,10 +88,10 @@ def parse_questioned(
     return task, _lines(questions, file)
 
 
-def _refusal(problems: list[Problem], file: yamlfile.TaskFile) -> TaskError:
-    return TaskError("\n".join(_lines(problems, file)))
+def _refusal(problems: list[Problem], file: TaskFile, more: int = 0) -> TaskError:
+    return TaskError(joined(_lines(problems, file), more))
 
 
-def _lines(found: Sequence[Problem | Question], file: yamlfile.TaskFile) -> list[str]:
+def _lines(found: Sequence[Problem | Question], file: TaskFile) -> list[str]:
     lines = sorted((file.line(each.path), str(each)) for each in found)
     return [f"{file.source}:{line}: {text}" for line, text in lines]

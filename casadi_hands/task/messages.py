@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
-from typing import Any
 
 from pydantic_core import ErrorDetails
 
 from casadi_hands.task.problem import Problem
 from casadi_hands.task.shapes import SECTIONS, spelled
+from casadi_hands.task.shown import shown
 from casadi_hands.task.structure import description_at, names_at, paths_of
 
 # A template, in which braces are doubled.
@@ -53,7 +53,7 @@ def _follows_from_another(error: ErrorDetails) -> bool:
 
 
 def _known(error: ErrorDetails) -> Problem:
-    path, kind, given = error["loc"], error["type"], _show(error["input"])
+    path, kind, given = error["loc"], error["type"], shown(error["input"])
     context = {**error.get("ctx", {}), "names": ", ".join(names_at(path))}
     given = context.get("given", given)
     if kind == "missing":
@@ -73,14 +73,3 @@ def _unknown(path: tuple[str | int, ...]) -> tuple[Problem, str | None]:
     elsewhere = paths_of(name)
     hint = f"; did you mean {' or '.join(elsewhere)}?" if elsewhere else ""
     return Problem(path, "an unknown field", f"{', '.join(section)}{hint}"), None
-
-
-def _show(value: Any) -> str:
-    if value is None:
-        return "nothing"
-    if isinstance(value, dict):
-        return "a mapping" + (f" of {', '.join(map(str, value))}" if value else " without fields")
-    if isinstance(value, list | tuple | str | int | float | bool):
-        text = repr(value) if not isinstance(value, bool) else str(value).lower()
-        return text if len(text) <= 60 else f"{text[:57]}..."
-    return type(value).__name__

@@ -55,31 +55,30 @@ def depth_in_palm(
         palm: the palm.
         pose: position (3,), m, and rotation (3, 3) world <- palm; by default where it starts.
     """
-    center, rotation = (np.array(palm.position), palm.rotation) if pose is None else pose
-    to_palm = rotation.T
+    center, rotation_palm = (np.array(palm.position), palm.rotation) if pose is None else pose
+    rotation, to_palm = rotation_matrix(vector), rotation_palm.T
 
-    def distance(point: np.ndarray) -> float:
-        """Signed distance of the disc and a point (3,) in the palm frame, m."""
-        beyond = np.array([np.hypot(point[0], point[1]) - palm.radius, max(point[2], -palm.thickness - point[2])])
-        return float(np.linalg.norm(np.maximum(beyond, 0)) + min(beyond.max(), 0))
+    def distance(points: np.ndarray) -> np.ndarray:
+        """Signed distances (E,) of the disc and points (E, 3) in the palm frame, m."""
+        across, above = np.hypot(points[:, 0], points[:, 1]), points[:, 2]
+        beyond = np.stack([across - palm.radius, np.maximum(above, -palm.thickness - above)])
+        return np.asarray(np.linalg.norm(np.maximum(beyond, 0), axis=0) + np.minimum(beyond.max(axis=0), 0))
 
-    rotation = rotation_matrix(vector)
-    depths = []
-    for shape in body.shapes:
-        for edge in shape.body.edges():
-            start, end = (to_palm @ (position + rotation @ p - center) for p in edge)
-            depths.append(shape.body.ball - _least(distance, start, end))
-    return float(max(depths))
+    edges = np.concatenate([shape.edges for shape in body.shapes])
+    balls = np.concatenate([np.full(len(shape.edges), shape.body.ball) for shape in body.shapes])
+    starts, ends = ((position + end @ rotation.T - center) @ to_palm.T for end in edges.swapaxes(0, 1))
+    return float(np.max(balls - _least(distance, starts, ends)))
 
 
-def _least(function: Callable[[np.ndarray], float], start: np.ndarray, end: np.ndarray) -> float:
-    """Least value of a convex function on the segment from start to end, (3,) each, by ternary search.
+def _least(function: Callable[[np.ndarray], np.ndarray], start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Least values (E,) of a convex function on the segments from start to end, (E, 3) each, by ternary search.
 
     The distance to a convex body is convex, so this finds its minimum.
     """
-    low, high = 0.0, 1.0
-    while high - low > 1e-9:
+    low, high = np.zeros((len(start), 1)), np.ones((len(start), 1))
+    along = end - start
+    while (high - low).max() > 1e-9:
         left, right = low + (high - low) / 3, high - (high - low) / 3
-        ahead = function(start + left * (end - start)) < function(start + right * (end - start))
-        low, high = (low, right) if ahead else (left, high)
-    return function(start + (low + high) / 2 * (end - start))
+        ahead = (function(start + left * along) < function(start + right * along))[:, None]
+        low, high = np.where(ahead, low, left), np.where(ahead, right, high)
+    return function(start + (low + high) / 2 * along)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from casadi_hands.task.shown import escaped
+
 
 @dataclass(frozen=True)
 class Problem:
@@ -43,6 +45,6 @@ class Question:
 
 def _name(path: tuple[str | int, ...]) -> str:
     name = ""
-    for step in path:
+    for step in (each if isinstance(each, int) else escaped(each) for each in path):
         name += f"[{step}]" if isinstance(step, int) else f".{step}" if name else step
     return name or "task"

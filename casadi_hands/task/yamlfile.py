@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
-from functools import lru_cache
-from pathlib import Path as FilePath
+from collections.abc import Callable
 from typing import Any
 
-from ruamel.yaml import YAML
-from ruamel.yaml.constructor import DuplicateKeyError
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from casadi_hands.errors import TaskError
+from casadi_hands.task.nodes import MOST_LEVELS, MOST_NODES, TooMuch, compose, too_deep, too_many
+from casadi_hands.task.problem import Problem
+from casadi_hands.task.shown import escaped, shown, unprintable
 
 Path = tuple[str | int, ...]
 """Where a value stands in the file: names of fields, and numbers in lists."""
+
+_CORE = "tag:yaml.org,2002:"
+_LONGEST_NUMBER = 400  # characters; Python reads no integer of more than 4300 digits
+_UNTAGGED = "values without a tag"
 
 
 class TaskFile:
@@ -33,81 +36,156 @@ class TaskFile:
             source: name for messages.
 
         Raises:
-            TaskError: not YAML, empty, or not a mapping.
+            TaskError: not YAML, empty, not a mapping, or more than a task file may have.
         """
         self.source = source
-        self._tree = _parse(text, source)
-        self.data: dict[str, Any] = _plain(self._tree)
+        root = compose(text, source)
+        try:
+            data = None if root is None else _Content().of(root, ())
+        except TooMuch as much:
+            raise TaskError(f"{source}:{much.line}: {much.what}") from None
+        except _Refused as refused:
+            raise TaskError(f"{source}:{refused.line}: {refused.problem}") from None
+        if root is None or data is None:
+            raise TaskError(f"{source}: empty; a task file needs at least object, palm, motion and fingers")
+        if not isinstance(data, dict):
+            given = "a list" if isinstance(data, list) else shown(data)
+            wanted = "a task file is a mapping of fields such as object, palm, motion and fingers"
+            raise TaskError(f"{source}:1: given {given}; {wanted}")
+        self._root = root
+        self._names: dict[int, dict[str, tuple[Node, Node]]] = {}  # by mapping node
+        self.data: dict[str, Any] = data
 
     def line(self, path: Path) -> int:
-        """Line of the value at ``path``, from 1; of the deepest part of the path that the file has."""
-        node, line = self._tree, 1
+        """Line of the value at ``path``, from 1; of the deepest part of the path that the file has.
+
+        What is not written there, a default, a missing field or one merged from an anchor, has no line.
+        """
+        node, line = self._root, 1
         for step in path:
-            # What is not written here, a default, a missing field or a value merged from an anchor, has no line.
-            with suppress(AttributeError, KeyError, TypeError, IndexError):
-                line = (node.lc.item(step) if isinstance(step, int) else node.lc.key(step))[0] + 1
-            try:
-                node = node[step]
-            except (KeyError, TypeError, IndexError):
+            key = child = None
+            if isinstance(node, MappingNode):
+                if id(node) not in self._names:
+                    self._names[id(node)] = {k.value: (k, v) for k, v in reversed(node.value)}
+                key, child = self._names[id(node)].get(step, (None, None))
+            elif isinstance(node, SequenceNode) and isinstance(step, int) and step < len(node.value):
+                key = child = node.value[step]
+            if key is None:
                 break
+            node, line = child, key.start_mark.line + 1
         return line
 
 
-def read(path: FilePath) -> str:
-    """Text of a file.
+class _Refused(Exception):
+    """What YAML allows, and a task file does not."""
 
-    Raises:
-        TaskError: there is none, or it is not text.
-    """
-    if not path.exists():
-        raise TaskError(f"{path}: no such file; give the path of a task file")
-    if path.is_dir():
-        raise TaskError(f"{path}: is a directory; give the path of a task file in it")
+    def __init__(self, node: Node, path: Path, given: str, allowed: str) -> None:
+        super().__init__(given)
+        self.line, self.problem = node.start_mark.line + 1, Problem(path, given, allowed)
+
+
+class _Content:
+    """Plain data of nodes, each alias written out, as long as there are not too many."""
+
+    def __init__(self) -> None:
+        self._nodes = 0
+        self._open: list[Node] = []
+
+    def of(self, node: Node, path: Path) -> Any:
+        """Copy of a node in Python's own types."""
+        self._nodes += 1
+        if any(node is each for each in self._open):
+            raise _Refused(node, path, "an alias of what it stands in", "aliases of what is written elsewhere")
+        if self._nodes > MOST_NODES:
+            raise TooMuch(too_many(), node.start_mark.line + 1)
+        if len(self._open) >= MOST_LEVELS:
+            raise TooMuch(too_deep(), node.start_mark.line + 1)
+        if isinstance(node, ScalarNode):
+            return _scalar(node, path)
+        if node.tag != _CORE + ("map" if isinstance(node, MappingNode) else "seq"):
+            raise _Refused(node, path, f"the tag {_tag(node)}", _UNTAGGED)
+        self._open.append(node)
+        if isinstance(node, MappingNode):
+            data: Any = self._mapping(node, path)
+        else:
+            data = [self.of(child, (*path, number)) for number, child in enumerate(node.value)]
+        self._open.pop()
+        return data
+
+    def _mapping(self, node: MappingNode, path: Path) -> dict[str, Any]:
+        own: dict[str, Any] = {}
+        merged: dict[str, Any] = {}
+        for key, value in node.value:
+            if not isinstance(key, ScalarNode):
+                kind = "mapping" if isinstance(key, MappingNode) else "list"
+                raise _Refused(key, path, f"a {kind} for a name", "names of fields")
+            self._nodes += 1
+            if key.tag == f"{_CORE}merge":
+                merged = {**self._merged(value, path), **merged}
+                continue
+            name = str(_scalar(key, path, str))
+            if name in own:
+                what = f"{escaped(name)}: given twice; each field may be given once"
+                raise TooMuch(what, key.start_mark.line + 1)
+            own[name] = self.of(value, (*path, name))
+        return own | {name: value for name, value in merged.items() if name not in own}
+
+    def _merged(self, node: Node, path: Path) -> dict[str, Any]:
+        """What `<<` takes over; of a list, from the first that has it."""
+        data = self.of(node, (*path, "<<"))
+        found: dict[str, Any] = {}
+        for each in data if isinstance(data, list) else [data]:
+            if not isinstance(each, dict):
+                raise _Refused(node, (*path, "<<"), shown(each), "a mapping, or a list of mappings, to be merged")
+            found |= {name: value for name, value in each.items() if name not in found}
+        return found
+
+
+def _number(text: str) -> int:
+    """Integer of YAML 1.2, with the underscores and the binary ones of 1.1."""
+    plain = text.replace("_", "").lower()
+    base = {"0x": 16, "0o": 8, "0b": 2}.get(plain.lstrip("+-")[:2], 10)
+    return int(plain, base)
+
+
+def _decimal(text: str) -> float:
+    plain = text.replace("_", "").lower()
+    special = plain.lstrip("+-") in (".inf", ".nan")
+    return float(plain.replace(".", "") if special else plain)
+
+
+_FROM: dict[str, Callable[[str], Any]] = {
+    "str": str,
+    "int": _number,
+    "float": _decimal,
+    "bool": lambda text: {"true": True, "false": False}[text.lower()],
+    "null": lambda text: {"": None, "~": None, "null": None}[text.lower()],
+    # Dates, and a lone `=`, are text to a task.
+    "timestamp": str,
+    "value": str,
+    "merge": str,
+}
+
+
+def _scalar(node: ScalarNode, path: Path, kind: Callable[[str], Any] | None = None) -> Any:
+    """What a scalar says; as its tag has it, or of a kind."""
+    text: str = node.value
+    if unprintable(text):
+        raise _Refused(node, path, shown(text), "text without control characters")
+    tag = str(node.tag).removeprefix(_CORE)
+    if tag not in _FROM:
+        raise _Refused(node, path, f"{_tag(node)} {escaped(text)}", _UNTAGGED)
+    if tag in ("int", "float") and len(text) > _LONGEST_NUMBER:
+        raise _Refused(node, path, escaped(text), f"a number of at most {_LONGEST_NUMBER} digits")
     try:
-        return path.read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise TaskError(f"{path}: not a text file; a task file is YAML in UTF-8") from None
-    except OSError as error:
-        raise TaskError(f"{path}: cannot be read: {error.strerror}") from None
+        return (kind or _FROM[tag])(text)
+    except (ValueError, KeyError, OverflowError):
+        raise _Refused(
+            node, path, f"{_tag(node)} {shown(text)}", "a value that fits its tag, or one without a tag"
+        ) from None
 
 
-def _parse(text: str, source: str) -> Any:
-    try:
-        tree = _tree(text)
-    except DuplicateKeyError as error:
-        line = error.problem_mark.line + 1 if error.problem_mark else 1
-        name = str(error.problem).split('"')[1]
-        raise TaskError(f"{source}:{line}: {name}: given twice; each field may be given once") from None
-    except MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        where = f"{source}:{mark.line + 1}" if mark else source
-        raise TaskError(f"{where}: not YAML: {error.problem or error.context}") from None
-    except YAMLError as error:
-        raise TaskError(f"{source}: not YAML: {str(error).splitlines()[0]}") from None
-    except RecursionError:
-        raise TaskError(f"{source}: nested too deeply; a task file needs a few levels") from None
-    if tree is None:
-        raise TaskError(f"{source}: empty; a task file needs at least object, palm, motion and fingers")
-    if not isinstance(tree, dict):
-        given = "a list" if isinstance(tree, list) else repr(_plain(tree))
-        wanted = "a task file is a mapping of fields such as object, palm, motion and fingers"
-        raise TaskError(f"{source}:1: given {given}; {wanted}")
-    return tree
-
-
-@lru_cache(maxsize=4)
-def _tree(text: str) -> Any:
-    """The text with its lines; a solve reads the task that it wrote once for each audit."""
-    return YAML(typ="rt").load(text)
-
-
-def _plain(node: Any) -> Any:
-    """Copy of a parsed tree in Python's own types."""
-    if isinstance(node, dict):
-        return {str(name): _plain(value) for name, value in node.items()}
-    if isinstance(node, list):
-        return [_plain(value) for value in node]
-    for kind in (bool, int, float, str):
-        if isinstance(node, kind):
-            return kind(node)
-    return node
+def _tag(node: Node) -> str:
+    """A tag as a file has it."""
+    tag = str(node.tag)
+    return escaped(f"!!{tag.removeprefix(_CORE)}" if tag.startswith(_CORE) else tag)
