@@ -48,6 +48,8 @@ _LONGEST_FINGER = 60
 
 MOST_SAMPLES = 3000
 """Of a motion."""
+MOST_PLACES = 2000
+"""Shapes of the object times goals."""
 
 _PLACE = Range(0.0, 1e5, "m")
 _SIZE = Range(1e-6, 1e5, "m")
@@ -115,8 +117,12 @@ def bound(data: dict[str, Any]) -> list[Problem]:
     return list(_bound(data, (), ""))
 
 
-def bound_samples(task: Task) -> list[Problem]:
-    """Find a motion of more samples than can be computed with."""
+def bound_together(task: Task) -> list[Problem]:
+    """Find a motion of more samples, or more shapes at more goals, than can be computed with."""
+    places = len(task.object.shapes) * len(task.motion)
+    if places > MOST_PLACES:
+        given = f"{len(task.object.shapes)} shapes at {len(task.motion)} goals"
+        return [Problem(("object", "shapes"), given, f"at most {MOST_PLACES}, shapes times goals")]
     samples = task.duration / task.time_step
     if samples <= MOST_SAMPLES:
         return []

@@ -8,7 +8,7 @@ from pathlib import Path as FilePath
 from pydantic import ValidationError
 
 from casadi_hands.errors import TaskError
-from casadi_hands.task.bounds import bound, bound_samples
+from casadi_hands.task.bounds import bound, bound_together
 from casadi_hands.task.checks import check
 from casadi_hands.task.mesh import FOLDER, WITHIN
 from casadi_hands.task.messages import explain
@@ -79,7 +79,7 @@ def parse_questioned(
         errors = sorted(error.errors(include_url=False), key=lambda each: file.line(each["loc"]))
         raise _refusal(explain(errors[:_MOST]), file, len(errors[_MOST:])) from None
     order = list(wrong_order(file.data))
-    problems = bound_samples(task) or check(task) + [each for each in order if isinstance(each, Problem)]
+    problems = bound_together(task) or check(task) + [each for each in order if isinstance(each, Problem)]
     questions = [*doubtful_units(task), *(each for each in order if isinstance(each, Question))]
     if not problems:
         task, problems = normalise(task)

@@ -23,7 +23,7 @@ _VERSION = re.compile(r"^%YAML[ \t]+(?!1\.2\b)(\S+)", re.MULTILINE)
 _LONGEST = 300  # characters of what the parser says
 
 
-class TooMuch(Exception):
+class TooMuchError(Exception):
     """More than a task file may have.
 
     Attributes:
@@ -49,9 +49,9 @@ class _Bounded(Composer):
         self._level += 1
         line = self.parser.peek_event().start_mark.line + 1
         if self._nodes > MOST_NODES:
-            raise TooMuch(too_many(), line)
+            raise TooMuchError(too_many(), line)
         if self._level > MOST_LEVELS:
-            raise TooMuch(too_deep(), line)
+            raise TooMuchError(too_deep(), line)
         node = super().compose_node(parent, index)
         self._level -= 1
         return node
@@ -81,13 +81,13 @@ def compose(text: str, source: str) -> Node | None:
         raise TaskError(f"{source}: given {len(text):,} characters; a task file has some thousand")
     if found := unprintable(text):
         line = text.count("\n", 0, found.start()) + 1
-        raise TaskError(f"{source}:{line}: given the character {ascii(found[0])}; a task file is text")
+        raise TaskError(f"{source}:{line}: given the character {found[0]!a}; a task file is text")
     if version := _VERSION.search(text):
         line = text.count("\n", 0, version.start()) + 1
         raise TaskError(f"{source}:{line}: given YAML {escaped(version[1])}; a task file is YAML 1.2")
     try:
         return _root(text)
-    except TooMuch as much:
+    except TooMuchError as much:
         raise TaskError(f"{source}:{much.line}: {much.what}") from None
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark

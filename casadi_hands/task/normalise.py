@@ -42,7 +42,8 @@ def _snap(point: Vector, body: ManipulatedObject, path: tuple[str, ...], problem
     distances = [abs(shape.body.signed_distance(start)) for shape in body.shapes]
     nearest = int(np.argmin(distances))
     shape, distance = body.shapes[nearest], distances[nearest]
-    given, tolerance = f"{list(point)}", CONTACT_TOLERANCE * body.characteristic_length
+    given, size = f"{list(point)}", body.characteristic_length
+    tolerance = CONTACT_TOLERANCE * size
     if distance > tolerance:
         allowed = f"a point within {tolerance:.3g} m of the object's surface; this one is {distance:.3g} m from it"
         problems.append(Problem(path, given, allowed))
@@ -50,9 +51,9 @@ def _snap(point: Vector, body: ManipulatedObject, path: tuple[str, ...], problem
     if not shape.body.has_normal(start):
         problems.append(Problem(path, given, "a point off the axis of its primitive, so that one side is nearest"))
         return point
-    snapped = start if distance <= _ROUNDING * body.characteristic_length else shape.body.on_surface(start)
+    snapped = start if distance <= _ROUNDING * size else shape.body.on_surface(start)
     for number, other in enumerate(body.shapes):
-        if other is not shape and other.body.signed_distance(snapped) < -1e-6 * body.characteristic_length:
+        if other is not shape and other.body.signed_distance(snapped) < -1e-6 * size:
             allowed = f"a point on the outside of the object; this one lies inside object.shapes[{number}]"
             problems.append(Problem(path, given, allowed))
             return point

@@ -106,7 +106,7 @@ class ManipulatedObject(Section):
     @property
     def bounding_box(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper corner of the box around the primitives, (3,) and (3,), m, object frame."""
-        lower, upper = (np.array(corners) for corners in zip(*[s.body.bounding_box for s in self.shapes], strict=True))
+        lower, upper = (np.array(corners) for corners in zip(*[s.bounding_box for s in self.shapes], strict=True))
         return lower.min(axis=0), upper.max(axis=0)
 
     def lowest_point(self, rotation: np.ndarray) -> np.ndarray:

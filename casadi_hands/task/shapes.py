@@ -60,6 +60,11 @@ class Primitive(Section):
         """The body's edges (E, 2, 3), m, object frame."""
         return np.array(self.body.edges(), float)
 
+    @cached_property
+    def bounding_box(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper corner of the box around the body, (3,) and (3,), m, object frame."""
+        return self.body.bounding_box
+
     @model_validator(mode="after")
     def _possible(self) -> Self:
         if allowed := self.body.impossible():

@@ -8,7 +8,7 @@ from typing import Any
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from casadi_hands.errors import TaskError
-from casadi_hands.task.nodes import MOST_LEVELS, MOST_NODES, TooMuch, compose, too_deep, too_many
+from casadi_hands.task.nodes import MOST_LEVELS, MOST_NODES, TooMuchError, compose, too_deep, too_many
 from casadi_hands.task.problem import Problem
 from casadi_hands.task.shown import escaped, shown, unprintable
 
@@ -42,9 +42,9 @@ class TaskFile:
         root = compose(text, source)
         try:
             data = None if root is None else _Content().of(root, ())
-        except TooMuch as much:
+        except TooMuchError as much:
             raise TaskError(f"{source}:{much.line}: {much.what}") from None
-        except _Refused as refused:
+        except _RefusedError as refused:
             raise TaskError(f"{source}:{refused.line}: {refused.problem}") from None
         if root is None or data is None:
             raise TaskError(f"{source}: empty; a task file needs at least object, palm, motion and fingers")
@@ -63,20 +63,24 @@ class TaskFile:
         """
         node, line = self._root, 1
         for step in path:
-            key = child = None
-            if isinstance(node, MappingNode):
-                if id(node) not in self._names:
-                    self._names[id(node)] = {k.value: (k, v) for k, v in reversed(node.value)}
-                key, child = self._names[id(node)].get(step, (None, None))
-            elif isinstance(node, SequenceNode) and isinstance(step, int) and step < len(node.value):
-                key = child = node.value[step]
-            if key is None:
+            found = self._below(node, step)
+            if found is None:
                 break
-            node, line = child, key.start_mark.line + 1
+            line, node = found[0].start_mark.line + 1, found[1]
         return line
 
+    def _below(self, node: Node, step: str | int) -> tuple[Node, Node] | None:
+        """Where the value of a step begins, and the value."""
+        if isinstance(node, SequenceNode) and isinstance(step, int) and step < len(node.value):
+            return node.value[step], node.value[step]
+        if not isinstance(node, MappingNode):
+            return None
+        if id(node) not in self._names:
+            self._names[id(node)] = {key.value: (key, value) for key, value in reversed(node.value)}
+        return self._names[id(node)].get(str(step))
 
-class _Refused(Exception):
+
+class _RefusedError(Exception):
     """What YAML allows, and a task file does not."""
 
     def __init__(self, node: Node, path: Path, given: str, allowed: str) -> None:
@@ -95,15 +99,15 @@ class _Content:
         """Copy of a node in Python's own types."""
         self._nodes += 1
         if any(node is each for each in self._open):
-            raise _Refused(node, path, "an alias of what it stands in", "aliases of what is written elsewhere")
+            raise _RefusedError(node, path, "an alias of what it stands in", "aliases of what is written elsewhere")
         if self._nodes > MOST_NODES:
-            raise TooMuch(too_many(), node.start_mark.line + 1)
+            raise TooMuchError(too_many(), node.start_mark.line + 1)
         if len(self._open) >= MOST_LEVELS:
-            raise TooMuch(too_deep(), node.start_mark.line + 1)
+            raise TooMuchError(too_deep(), node.start_mark.line + 1)
         if isinstance(node, ScalarNode):
             return _scalar(node, path)
         if node.tag != _CORE + ("map" if isinstance(node, MappingNode) else "seq"):
-            raise _Refused(node, path, f"the tag {_tag(node)}", _UNTAGGED)
+            raise _RefusedError(node, path, f"the tag {_tag(node)}", _UNTAGGED)
         self._open.append(node)
         if isinstance(node, MappingNode):
             data: Any = self._mapping(node, path)
@@ -118,7 +122,7 @@ class _Content:
         for key, value in node.value:
             if not isinstance(key, ScalarNode):
                 kind = "mapping" if isinstance(key, MappingNode) else "list"
-                raise _Refused(key, path, f"a {kind} for a name", "names of fields")
+                raise _RefusedError(key, path, f"a {kind} for a name", "names of fields")
             self._nodes += 1
             if key.tag == f"{_CORE}merge":
                 merged = {**self._merged(value, path), **merged}
@@ -126,7 +130,7 @@ class _Content:
             name = str(_scalar(key, path, str))
             if name in own:
                 what = f"{escaped(name)}: given twice; each field may be given once"
-                raise TooMuch(what, key.start_mark.line + 1)
+                raise TooMuchError(what, key.start_mark.line + 1)
             own[name] = self.of(value, (*path, name))
         return own | {name: value for name, value in merged.items() if name not in own}
 
@@ -136,7 +140,7 @@ class _Content:
         found: dict[str, Any] = {}
         for each in data if isinstance(data, list) else [data]:
             if not isinstance(each, dict):
-                raise _Refused(node, (*path, "<<"), shown(each), "a mapping, or a list of mappings, to be merged")
+                raise _RefusedError(node, (*path, "<<"), shown(each), "a mapping, or a list of mappings, to be merged")
             found |= {name: value for name, value in each.items() if name not in found}
         return found
 
@@ -171,16 +175,16 @@ def _scalar(node: ScalarNode, path: Path, kind: Callable[[str], Any] | None = No
     """What a scalar says; as its tag has it, or of a kind."""
     text: str = node.value
     if unprintable(text):
-        raise _Refused(node, path, shown(text), "text without control characters")
+        raise _RefusedError(node, path, shown(text), "text without control characters")
     tag = str(node.tag).removeprefix(_CORE)
     if tag not in _FROM:
-        raise _Refused(node, path, f"{_tag(node)} {escaped(text)}", _UNTAGGED)
+        raise _RefusedError(node, path, f"{_tag(node)} {escaped(text)}", _UNTAGGED)
     if tag in ("int", "float") and len(text) > _LONGEST_NUMBER:
-        raise _Refused(node, path, escaped(text), f"a number of at most {_LONGEST_NUMBER} digits")
+        raise _RefusedError(node, path, escaped(text), f"a number of at most {_LONGEST_NUMBER} digits")
     try:
         return (kind or _FROM[tag])(text)
     except (ValueError, KeyError, OverflowError):
-        raise _Refused(
+        raise _RefusedError(
             node, path, f"{_tag(node)} {shown(text)}", "a value that fits its tag, or one without a tag"
         ) from None
 
