@@ -6,7 +6,7 @@ The ranges are far wider than hands are; they keep computing with a task short, 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 from casadi_hands.task.problem import Problem
@@ -70,7 +70,7 @@ RANGES = {
     "tool_at": _PLACE,
     "ground.height": _PLACE,
     "radius": _SIZE,
-    "edge_radius": _SIZE,
+    "edge_radius": Range(1e-8, 1e5, "m"),
     "palm.thickness": _SIZE,
     "hand.link_radius": _SIZE,
     "hand.link_length": _SIZE,
@@ -112,7 +112,7 @@ def bound(data: dict[str, Any]) -> list[Problem]:
     """Find what a task may not have, before anything is computed with it.
 
     Args:
-        data: of a file, before it is known to be a task.
+        data: of a file, before it is known to be a task, or of a task.
     """
     return list(_bound(data, (), ""))
 
@@ -138,7 +138,7 @@ def bound_together(task: Task) -> list[Problem]:
 
 def _bound(value: Any, path: tuple[str | int, ...], name: str) -> Iterator[Problem]:
     """Problems of a value and all in it; ``name`` is its path without numbers in lists and names of fingers."""
-    if isinstance(value, dict | list):
+    if isinstance(value, dict | list | tuple):
         most = COUNTS.get(name)
         if most is not None and len(value) > most:
             yield Problem(path, f"{len(value):,} of them", f"at most {most}")
@@ -151,7 +151,7 @@ def _bound(value: Any, path: tuple[str | int, ...], name: str) -> Iterator[Probl
                 continue
             inner = name if name == "fingers" else f"{name}.{key}" if name else key
             yield from _bound(each, (*path, key), inner)
-    elif isinstance(value, list):
+    elif isinstance(value, list | tuple):
         yield from _direction(value, path, name)
         for number, each in enumerate(value):
             yield from _bound(each, (*path, number), name)
@@ -178,7 +178,7 @@ def _text(value: str, path: tuple[str | int, ...], name: str) -> Iterator[Proble
         yield Problem(path, shown(value), "text in a line, without tabs")
 
 
-def _direction(value: list[Any], path: tuple[str | int, ...], name: str) -> Iterator[Problem]:
+def _direction(value: Sequence[Any], path: tuple[str | int, ...], name: str) -> Iterator[Problem]:
     if name.split(".")[-1] not in _DIRECTIONS or not all(isinstance(each, int | float) for each in value):
         return
     if 0 < max((abs(each) for each in value), default=0) < SHORTEST_DIRECTION:

@@ -83,6 +83,8 @@ def parse_questioned(
     questions = [*doubtful_units(task), *(each for each in order if isinstance(each, Question))]
     if not problems:
         task, problems = normalise(task)
+    # What follows from large numbers is larger; a task that is written must be one again.
+    problems = problems or bound(task.model_dump(by_alias=True, exclude_none=True))
     if problems:
         raise _refusal(problems, file)
     return task, _lines(questions, file)

@@ -33,7 +33,19 @@ def read(path: Path) -> str:
         TaskError: there is none, it is too large, or it is not text.
     """
     name = file_name(path)
-    data = _bytes(path, name)
+    return decode(_bytes(path, name), name)
+
+
+def decode(data: bytes, name: str) -> str:
+    """Text of a file's content, with line feeds between lines.
+
+    Args:
+        data: content.
+        name: of the file, for messages.
+
+    Raises:
+        TaskError: it is too large, or not text.
+    """
     if len(data) > LARGEST:
         raise TaskError(f"{name}: given a file of more than {LARGEST:,} bytes; a task file has some thousand")
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
