@@ -20,6 +20,7 @@ import signal
 import sys
 import time
 import traceback
+import unicodedata
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -154,6 +155,12 @@ def attempt(number: int, data: bytes) -> Outcome:
     return outcome(kind, detail)
 
 
+def _controls(text: str) -> bool:
+    """Whether a text has what a terminal or XML would not take for text."""
+    kinds = {unicodedata.category(each) for each in text.replace("\n", "")}
+    return bool(kinds & {"Cc", "Cs", "Zl", "Zp"}) or any(each in text for each in "\u202e\u2066\ufffe\uffff")
+
+
 def _read(data: bytes) -> tuple[str, str]:
     """What the package says of a file: kind and detail of its outcome."""
     from rich.console import Console
@@ -169,12 +176,12 @@ def _read(data: bytes) -> tuple[str, str]:
         message = str(error)
         if len(message.encode(errors="replace")) > LONGEST:
             return "long message", message
-        if not message.replace("\n", "").isprintable():
+        if _controls(message):
             return "control characters", ascii(message)
         return ("refused" if message.strip() else "no message"), message
     printed = io.StringIO()
     Console(file=printed, width=100).print(check_summary(task)[0])
-    if not printed.getvalue().replace("\n", "").isprintable():
+    if _controls(printed.getvalue()):
         return "control characters", ascii(printed.getvalue())
     written = task_to_yaml(task)
     written.encode()

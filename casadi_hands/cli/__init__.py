@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 
@@ -14,6 +15,9 @@ def main() -> None:
     # these once, when it is imported, so they come before every other import.
     for name in _THREADS:
         os.environ.setdefault(name, "1")
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # where a terminal knows fewer characters than are printed
+            stream.reconfigure(errors="backslashreplace")
     from casadi_hands.cli.app import app
     from casadi_hands.errors import HandsError
 

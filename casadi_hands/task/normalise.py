@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from casadi_hands.task.fields import Vector, vector
@@ -12,6 +14,8 @@ from casadi_hands.task.task import Task
 
 # Share of the characteristic length within which a contact is moved onto the surface without a word.
 CONTACT_TOLERANCE = 0.2
+# The same within which contacts that were moved are in one place.
+_TOGETHER = 1e-3
 # Of the characteristic length; shorter lengths are rounding: nothing is moved for them, so that normalising a task
 # twice, or saving and loading it, leaves it equal to the last digit.
 _ROUNDING = 1e-12
@@ -28,6 +32,7 @@ def normalise(task: Task) -> tuple[Task, list[Problem]]:
     for name, finger in task.fingers.items():
         snapped = _snap(finger.touches, task.object, ("fingers", name, "touches"), problems)
         fingers[name] = finger.model_copy(update={"touches": snapped})
+    problems += [] if problems else _together(task, {name: finger.touches for name, finger in fingers.items()})
     if ground:
         snapped = _snap(ground.touches, task.object, ("ground", "touches"), problems)
         ground = ground.model_copy(update={"touches": snapped})
@@ -58,6 +63,17 @@ def _snap(point: Vector, body: ManipulatedObject, path: tuple[str, ...], problem
             problems.append(Problem(path, given, allowed))
             return point
     return vector(snapped)
+
+
+def _together(task: Task, moved: dict[str, Vector]) -> Iterator[Problem]:
+    """Contacts that were apart as given, and are in one place on the surface."""
+    names, room = list(moved), _TOGETHER * task.object.characteristic_length
+    for number, name in enumerate(names):
+        for other in names[:number]:
+            if np.linalg.norm(np.subtract(moved[name], moved[other])) < room:
+                given = f"{list(task.fingers[name].touches)}"
+                allowed = f"a point whose nearest one on the surface, {list(moved[name])}, is not that of {other}"
+                yield Problem(("fingers", name, "touches"), given, allowed)
 
 
 def _recentre(task: Task) -> Task:
