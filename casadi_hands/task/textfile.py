@@ -48,7 +48,8 @@ def decode(data: bytes, name: str) -> str:
     """
     if len(data) > LARGEST:
         raise TaskError(f"{name}: given a file of more than {LARGEST:,} bytes; a task file has some thousand")
-    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+    # Of a text in UTF-16 or UTF-32 the first characters, which are Latin ones, have zeros beside them.
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) or data[:4].count(0) > 1:
         raise TaskError(f"{name}: given a text in UTF-16 or UTF-32; a task file is YAML in UTF-8")
     try:
         text = data.decode("utf-8-sig")
