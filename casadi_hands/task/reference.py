@@ -7,15 +7,19 @@ from collections.abc import Iterator
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from casadi_hands.task.bounds import ANYTHING, COUNTS, LENGTHS, MOST_PLACES, MOST_SAMPLES, RANGES
 from casadi_hands.task.fields import Section
+from casadi_hands.task.nodes import MOST_LEVELS, MOST_NODES
 from casadi_hands.task.rotation import Rotation
 from casadi_hands.task.structure import fields_of, sections_in
 from casadi_hands.task.task import Task
+from casadi_hands.task.textfile import LARGEST
 
 
 def describe_fields() -> str:
-    """Markdown: a table for each section of the task file, with every field's default and meaning."""
-    return "\n".join(line for name, section in _sections(Task, "") for line in [*_table(name, section), ""])
+    """Markdown: a table for each section of the task file, with every field's default and meaning; and the bounds."""
+    tables = [line for name, section in _sections(Task, "") for line in [*_table(name, section), ""]]
+    return "\n".join([*tables, *_bounds(), ""])
 
 
 def _sections(section: type[Section], name: str) -> Iterator[tuple[str, type[Section]]]:
@@ -43,6 +47,29 @@ def _table(name: str, section: type[Section]) -> Iterator[str]:
         yield f"| `{field_name}` | {_default(field)} | {field.description} |"
     if section is Rotation:
         yield "| `quaternion` | | Instead of axis and degrees: [w, x, y, z], object to world, of any length but 0. |"
+
+
+def _bounds() -> Iterator[str]:
+    yield "### Bounds"
+    yield ""
+    yield (
+        "What is beyond is refused before anything is computed with it. A name stands for every field that ends with "
+        "it; zero and signs are up to the field."
+    )
+    yield ""
+    yield "| field | at least | at most | |"
+    yield "|---|---|---|---|"
+    for name, each in RANGES.items():
+        yield f"| `{name}` | {f'{each.least:g}' if each.least else ''} | {each.most:g} | {each.unit} |"
+    yield f"| any other number | | {ANYTHING.most:g} | |"
+    for name, most in COUNTS.items():
+        yield f"| `{name}` | | {most} | of them |"
+    for name, most in LENGTHS.items():
+        yield f"| `{name}` | | {most} | characters |"
+    yield f"| `object.shapes` × `motion` | | {MOST_PLACES} | shapes times goals |"
+    yield f"| `duration` / `time_step` | | {MOST_SAMPLES} | samples |"
+    yield f"| the file | | {LARGEST} | bytes |"
+    yield f"| the file, aliases written out | | {MOST_NODES} | names and values, in {MOST_LEVELS} levels |"
 
 
 def _shape(field: FieldInfo) -> str:
