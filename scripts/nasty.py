@@ -177,7 +177,7 @@ def mutant(number: int) -> bytes:
 
 @cache
 def _sources() -> tuple[str, ...]:
-    return tuple(path.read_text(encoding="utf-8") for path in sorted(PROBLEMS.glob("*.yaml")))
+    return tuple(path.read_text(encoding="utf-8") for path in sorted(PROBLEMS.rglob("*.yaml")))
 
 
 def _encoded(text: str, random: Random) -> bytes:

@@ -28,6 +28,7 @@ _ALLOWED = {
     "tuple_type": "a list",
     "model_type": "a mapping with the fields {names}",
     "dict_type": "a mapping of names, such as thumb: {{touches: [0, 0.02, 0]}}",
+    "too_long": "at most {max_length} of them",
     "union_tag_invalid": _KINDS,
     "union_tag_not_found": _KINDS,
     "refused": "{allowed}",
