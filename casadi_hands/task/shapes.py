@@ -55,6 +55,7 @@ class Primitive(Section):
     def on_its_own(self) -> None:
         """Forget of which mesh it is a part, once all that follows from the mesh is known."""
         self._part_of = None
+
     @cached_property
     def edges(self) -> np.ndarray:
         """The body's edges (E, 2, 3), m, object frame."""
