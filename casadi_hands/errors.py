@@ -2,9 +2,24 @@
 
 from __future__ import annotations
 
+LONGEST_MESSAGE = 1900
+"""Characters; what is longer than a screen nobody reads."""
+
 
 class HandsError(Exception):
-    """Root of every error this package raises on purpose."""
+    """Root of every error this package raises on purpose; its message is of bounded length and can be printed."""
+
+    def __init__(self, message: object = "") -> None:
+        super().__init__(printable(str(message)))
+
+
+def printable(text: str) -> str:
+    """Text with what would command a terminal escaped, and its middle left out where it is too long."""
+    text = "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in text[: 20 * LONGEST_MESSAGE])
+    if len(text) <= LONGEST_MESSAGE:
+        return text
+    half = LONGEST_MESSAGE // 2 - 10
+    return f"{text[:half]} […] {text[-half:]}"
 
 
 class TaskError(HandsError):

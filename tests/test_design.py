@@ -218,11 +218,11 @@ def edit(folder, **changes):
     ("spoil", "message"),
     [
         (lambda folder: (folder / "result.json").unlink(), "no result.json"),
-        (lambda folder: (folder / "motion.npz").unlink(), "motion.npz: not a motion file"),
+        (lambda folder: (folder / "motion.npz").unlink(), "motion.npz: missing"),
         (lambda folder: (folder / "task.yaml").unlink(), "task cannot be read"),
         (lambda folder: (folder / "result.json").write_text("{"), "cannot be read"),
         (lambda folder: edit(folder, format=2), "its format is 2; this version reads format 1"),
-        (lambda folder: edit(folder, hand={"palm": {}}), "the hand lacks 'radius'"),
+        (lambda folder: edit(folder, hand={"palm": {}}), "result.json: lacks hand.palm.radius"),
     ],
 )
 def test_a_spoilt_folder_is_refused(saved, spoil, message):

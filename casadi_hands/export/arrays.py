@@ -5,12 +5,16 @@ from __future__ import annotations
 import zipfile
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from casadi_hands.errors import DesignError
 from casadi_hands.problem.motion import Motion
+from casadi_hands.problem.stored import LARGEST_NUMBER, check_samples, read_arrays
+
+if TYPE_CHECKING:
+    from casadi_hands.task import Task
 
 _NAMES = ("joint_names", "contact_names", "contact_link")
 # Shapes as the result format gives them: S samples, J joints, C contacts.
@@ -40,6 +44,7 @@ _SHAPES: dict[str, tuple[str | int, ...]] = {
     "external_torque_disturbed": ("S", 3),
 }
 _OPTIONAL = frozenset(item.name for item in fields(Motion) if item.default is None)
+_NO_TURN = 1e-3
 _FIRST_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest a zip file can hold: a stamp that says nothing
 
 
@@ -63,27 +68,44 @@ def save_motion(motion: Motion, path: Path) -> None:
                 np.lib.format.write_array(file, array, allow_pickle=False)
 
 
-def load_motion(path: Path) -> Motion:
+def load_motion(path: Path, task: Task | None = None) -> Motion:
     """Read a motion that `save_motion` wrote.
 
     Args:
         path: the file to read.
+        task: of which it is a motion, which says how many samples it can have.
 
     Raises:
-        DesignError: the file cannot be read, or an array is missing, has the wrong shape or is not finite.
+        DesignError: the file cannot be read, or an array is missing, has the wrong type or shape, or holds what is not
+            finite or too large.
     """
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            stored = {name: file[name] for name in file.files}
-    except (OSError, ValueError, zipfile.BadZipFile) as error:
-        raise DesignError(f"{path}: not a motion file: {error}") from error
+    stored = read_arrays(path, _SHAPES)
     missing = [name for name in _SHAPES if name not in stored and name not in _OPTIONAL]
     if missing:
         raise DesignError(f"{path}: the motion lacks {', '.join(missing)}")
     _check(stored, path)
-    entries: dict[str, Any] = {name: stored.get(name) for name in _SHAPES}
+    if task is not None:
+        check_samples(path, len(stored["time"]), task)
+    _check_motion(stored, path)
+    floats = {name: array.astype(np.float64) for name, array in stored.items() if array.dtype.kind in "fiu"}
+    entries: dict[str, Any] = {name: {**stored, **floats}.get(name) for name in _SHAPES}
     entries |= {name: tuple(str(item) for item in stored[name]) for name in _NAMES}
     return Motion(**entries)
+
+
+def _check_motion(arrays: dict[str, np.ndarray], path: Path) -> None:
+    """Raise `DesignError` unless arrays are of their types, numbers of a size that things have, and times increase."""
+    for name, array in arrays.items():
+        kinds = {"contact_active": "b", **dict.fromkeys(_NAMES, "U")}.get(name, "fiu")
+        if array.dtype.kind not in kinds:
+            raise DesignError(f"{path}: {name} holds {array.dtype}, which it must not")
+        if array.dtype.kind in "fiu" and np.any(np.abs(array.astype(np.float64)) > LARGEST_NUMBER):
+            raise DesignError(f"{path}: {name} holds a number too large for anything of a hand")
+    if len(arrays["time"]) < 2 or not np.all(np.diff(arrays["time"].astype(np.float64)) > 0):
+        raise DesignError(f"{path}: time must hold at least two increasing samples")
+    for name in ("object_orientation", "base_orientation"):
+        if np.linalg.norm(arrays[name].astype(np.float64), axis=1).min() < _NO_TURN:
+            raise DesignError(f"{path}: {name} is the zero quaternion at a sample")
 
 
 def _arrays(motion: Motion) -> dict[str, np.ndarray]:

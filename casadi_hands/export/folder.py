@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,8 @@ from casadi_hands.export.commands import commanded
 from casadi_hands.export.meshes import FOLDER, mesh_files
 from casadi_hands.export.mjcf import scene_mjcf
 from casadi_hands.export.page.page import write_page
-from casadi_hands.export.record import FORMAT, STATUSES, design_record, hand_from_record, record_text
+from casadi_hands.export.checked import read_record
+from casadi_hands.export.record import STATUSES, design_record, hand_from_record, record_text
 from casadi_hands.export.table import motion_table
 from casadi_hands.export.urdf import hand_urdf, object_urdf
 from casadi_hands.problem.result import Result
@@ -28,7 +28,6 @@ _FILES = (
     "result.json",
     "viewer.html",
 )
-_ENTRIES = ("status", "reason", "hand", "samples", "costs", "certificate", "stages", "seconds")
 
 
 def save_design(design: Result, directory: Path, page: bool = True) -> None:
@@ -116,7 +115,7 @@ def read_design(directory: Path) -> dict[str, Any]:
     Raises:
         DesignError: there is no such folder, it is incomplete, or of another format.
     """
-    record = _read_record(directory)
+    record = read_record(directory)
     try:
         task = load_task(directory / "task.yaml", within=True)
     except TaskError as error:
@@ -125,7 +124,7 @@ def read_design(directory: Path) -> dict[str, Any]:
         hand = hand_from_record(record)
     except DesignError as error:
         raise DesignError(f"{directory / 'result.json'}: {error}") from error
-    motion = load_motion(directory / "motion.npz") if record["samples"] is not None else None
+    motion = load_motion(directory / "motion.npz", task) if record["samples"] is not None else None
     if hand is not None and motion is not None and motion.joint_names != hand.joint_names:
         raise DesignError(f"{directory}: motion.npz moves other joints than those of the hand in result.json")
     return dict(
@@ -140,23 +139,3 @@ def read_design(directory: Path) -> dict[str, Any]:
         stages=record["stages"],
         seconds=record["seconds"],
     )
-
-
-def _read_record(directory: Path) -> dict[str, Any]:
-    """The folder's ``result.json``, of the format this version reads and with the entries a design needs."""
-    if not directory.is_dir():
-        raise DesignError(f"{directory}: there is no such folder; give one that `casadi-hands solve` wrote")
-    path = directory / "result.json"
-    if not path.exists():
-        raise DesignError(f"{directory}: no result.json, so this is not the folder of a finished design")
-    try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise DesignError(f"{path}: cannot be read: {error}") from error
-    if not isinstance(record, dict) or record.get("format") != FORMAT:
-        given = record.get("format") if isinstance(record, dict) else None
-        raise DesignError(f"{path}: its format is {given!r}; this version reads format {FORMAT}")
-    missing = [name for name in _ENTRIES if name not in record]
-    if missing:
-        raise DesignError(f"{path}: lacks {', '.join(missing)}")
-    return record

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.errors import DesignError
+from casadi_hands.export.checked import FORMAT
 from casadi_hands.problem.drive import Drive
 from casadi_hands.problem.hand import Finger, Hand, Link
 from casadi_hands.problem.result import Result
@@ -22,7 +23,6 @@ from casadi_hands.task import task_to_yaml
 if TYPE_CHECKING:
     from casadi_hands.task import Task
 
-FORMAT = 1
 STATUSES = ("certified", "feasible", "failed")
 _PACKAGES = ("casadi-hands", "casadi", "pin", "coal", "mujoco", "numpy")
 
@@ -104,7 +104,7 @@ def hand_from_record(record: dict[str, Any]) -> Hand | None:
 
 
 def _drive_from_record(entry: dict[str, Any]) -> Drive | None:
-    if "ratios" not in entry:
+    if entry.get("ratios") is None:
         return None
     return Drive(
         ratios=tuple(tuple(float(ratio) for ratio in row) for row in entry["ratios"]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -76,7 +77,8 @@ class Result:
         first = self.replays[0]
         planned = "drops the object as planned"
         if not first["dropped_as_planned"]:
-            planned = f"{first['mean']['mm']:.2g} mm and {first['mean']['degrees']:.2g}° off plan on average"
+            mean = {unit: math.nan if value is None else value for unit, value in first["mean"].items()}
+            planned = f"{mean['mm']:.2g} mm and {mean['degrees']:.2g}° off plan on average"
         dropping = [name for name, each in first.get("perturbed", {}).items() if each["dropped"]]
         return (
             f"in MuJoCo {planned}, {first['dropped']} of {first['of']} perturbed replays drop it{first_few(dropping)}"

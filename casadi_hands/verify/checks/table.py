@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import csv
+import io
 
 import numpy as np
 
 from casadi_hands.errors import DesignError
+from casadi_hands.problem.stored import read_text
 from casadi_hands.verify.reading.folder import Folder
 
 _UNITS = {
@@ -30,10 +32,9 @@ def table_problems(folder: Folder) -> list[str]:
     if not path.is_file():
         return []
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            names, *rows = csv.reader(file)
+        names, *rows = csv.reader(io.StringIO(read_text(path), newline=""))
         values = np.array([[float(word) for word in row] for row in rows])
-    except (OSError, ValueError, csv.Error) as error:
+    except (ValueError, csv.Error) as error:
         raise DesignError(f"{path}: not a table of numbers: {error}") from None
     due = _columns(folder)
     if values.shape != (len(folder.motion.time), len(names)) or not np.all(np.isfinite(values)):

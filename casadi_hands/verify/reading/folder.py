@@ -14,6 +14,7 @@ import pinocchio as pin
 
 from casadi_hands.errors import DesignError
 from casadi_hands.problem.motion import Motion
+from casadi_hands.problem.stored import LARGEST_TEXT, check_samples, read_bytes
 from casadi_hands.task import Task, load_task
 from casadi_hands.verify.bodies import Body, ground_body
 from casadi_hands.verify.forms import FORMS
@@ -168,6 +169,7 @@ def read_folder(directory: str | Path, task: str | Path | None = None) -> Folder
     hand, object_file = read_robot(path / "hand.urdf"), read_robot(path / "object.urdf")
     written = load_task(path / "task.yaml", within=True)
     motion, result = read_motion(path / "motion.npz"), read_record(path / "result.json")
+    check_samples(path / "motion.npz", len(motion.time), written)
     motors = None if motion.motor_positions is None else motion.motor_positions.shape[1]
     folder = Folder(
         path=path,
@@ -180,7 +182,7 @@ def read_folder(directory: str | Path, task: str | Path | None = None) -> Folder
         joints=hand.joints,
         object=_object(path / "object.urdf", object_file),
         scene=read_scene(path / "scene.xml") if (path / "scene.xml").is_file() else None,
-        task_hash=hashlib.sha256((path / "task.yaml").read_bytes()).hexdigest(),
+        task_hash=hashlib.sha256(read_bytes(path / "task.yaml", LARGEST_TEXT)).hexdigest(),
         drive=read_drive(path / "result.json", result, len(motion.joint_names), motors),
         strange=(*hand.strange, *object_file.strange),
         model=_model(path / "hand.urdf", hand),
@@ -234,7 +236,7 @@ def _model(path: Path, robot: Robot) -> pin.Model:
         if link != "palm":
             raise DesignError(f"{path}: link '{name}' hangs in a ring, not on the palm")
     try:
-        return pin.buildModelFromUrdf(str(path))
+        return pin.buildModelFromXML(robot.text)
     except (ValueError, RuntimeError) as error:
         raise DesignError(f"{path}: {error}") from None
 

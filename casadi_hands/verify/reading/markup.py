@@ -11,13 +11,20 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from casadi_hands.errors import DesignError
+from casadi_hands.problem.stored import LARGEST_NUMBER, read_text
 
-LARGEST = 1e9
-"""No number of a hand, in SI units, is larger."""
+MOST = 20_000
+"""Elements of a file; a hand of eight fingers and thirty joints has about a thousand."""
 
 DEEPEST = 64
 """No element is deeper in a file: a finger has few links."""
 
+_OPENING = frozenset(("include", "extension", "plugin", "model", "attach", "replicate", "composite", "flexcomp"))
+_FILES = frozenset(
+    f"{name}{which}"
+    for name in ("file", "filename", "meshdir", "texturedir", "assetdir", "url", "uri")
+    for which in ("", "right", "left", "up", "down", "front", "back")
+)
 _NAMES = frozenset(("name", "model", "link", "joint", "body1", "body2"))
 _NONE = frozenset(("nan", "inf", "infinity"))
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
@@ -27,35 +34,52 @@ def read_xml(path: Path, root: str) -> Element:
     """Return the root element of an XML file.
 
     Raises:
-        DesignError: the file is missing, is not XML, declares entities, or has another root.
+        DesignError: the file is missing, is not XML, declares entities, has another root, is larger than any hand's,
+            or names another file.
     """
+    text = read_text(path)
+    if "<!" in re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL):
+        raise DesignError(f"{path}: declares a document type; the format has none")
     try:
-        text = path.read_text(encoding="utf-8")
-        if "<!" in re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL):
-            raise DesignError(f"{path}: declares a document type; the format has none")
         tree = ElementTree.fromstring(text)
-    except FileNotFoundError:
-        raise DesignError(f"{path}: missing") from None
-    except (OSError, UnicodeDecodeError, ElementTree.ParseError, RecursionError) as error:
+    # ValueError and LookupError of encodings that it declares.
+    except (ElementTree.ParseError, ValueError, LookupError, RecursionError) as error:
         raise DesignError(f"{path}: not XML: {error}") from None
     if tree.tag != root:
-        raise DesignError(f"{path}: its root is <{tree.tag}>, not <{root}>")
+        raise DesignError(f"{path}: its root is <{tree.tag[:60]}>, not <{root}>")
+    if sum(1 for _ in tree.iter()) > MOST:
+        raise DesignError(f"{path}: has more than {MOST} elements, which no hand needs")
     level = [tree]
     for _ in range(DEEPEST):
         level = [child for element in level for child in element]
     if level:
         raise DesignError(f"{path}: nested too deeply")
     for element in tree.iter():
+        _check_own(path, element)
         for name, text in element.items():
             if name not in _NAMES and not {word.lstrip("+-").lower() for word in text.split()}.isdisjoint(_NONE):
                 raise DesignError(f"{path}: {called(element)}: {name} is '{text[:60]}', which is not finite")
     return tree
 
 
+def _check_own(path: Path, element: Element) -> None:
+    """Refuse what would have a reader open another file, or load other code.
+
+    Raises:
+        DesignError: the element does, or has an attribute that cannot be printed.
+    """
+    if element.tag in _OPENING or not _FILES.isdisjoint(element.attrib):
+        raise DesignError(
+            f"{path}: {called(element)} would have a reader open other files, run a plugin or make copies"
+        )
+    if not all(value.isprintable() for value in element.attrib.values()):
+        raise DesignError(f"{path}: {called(element)} has an attribute with control characters")
+
+
 def called(element: Element) -> str:
     """Return the element as a reader finds it in the file: ``<link name="palm">``."""
-    name = element.get("name")
-    return f"<{element.tag}>" if name is None else f'<{element.tag} name="{name}">'
+    tag, name = element.tag[:60], element.get("name")
+    return f"<{tag}>" if name is None else f'<{tag} name="{name[:60]}">'
 
 
 def numbers(path: Path, element: Element, name: str, count: int, default: str | None = None) -> np.ndarray:
@@ -72,7 +96,7 @@ def numbers(path: Path, element: Element, name: str, count: int, default: str | 
         what = "a finite number" if count == 1 else f"{count} finite numbers"
         raise DesignError(f"{path}: {called(element)}: {name} is '{text[:60]}', not {what}")
     values = np.array([float(word) for word in words])
-    if np.any(np.abs(values) > LARGEST):
+    if np.any(np.abs(values) > LARGEST_NUMBER):
         raise DesignError(f"{path}: {called(element)}: {name} is '{text[:60]}', too large for anything of a hand")
     return values
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -54,11 +55,13 @@ class Robot:
         links: by name, in the file's order.
         joints: likewise.
         strange: what the format does not have, a sentence each.
+        text: the file's content as it was read, comments left out.
     """
 
     links: dict[str, Body]
     joints: dict[str, Joint]
     strange: tuple[str, ...]
+    text: str
 
 
 def read_robot(path: Path) -> Robot:
@@ -71,6 +74,7 @@ def read_robot(path: Path) -> Robot:
             finite or cannot be; a shape is none of those that it knows; a joint does not turn.
     """
     root = read_xml(path, "robot")
+    text = ElementTree.tostring(root, encoding="unicode")
     links: dict[str, Body] = {}
     joints: dict[str, Joint] = {}
     strange = list(strangers(root, "link joint transmission material mujoco", "name version"))
@@ -89,7 +93,7 @@ def read_robot(path: Path) -> Robot:
             strange += _compiler(element)
         elif element.tag == "transmission":
             strange += _transmission(element, {joint.get("name") for joint in root.findall("joint")})
-    return Robot(links, joints, tuple(f"{path.name}: {what}" for what in strange))
+    return Robot(links, joints, tuple(f"{path.name}: {what}" for what in strange), text)
 
 
 def _compiler(element: Element) -> list[str]:

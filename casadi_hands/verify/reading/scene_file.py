@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -13,6 +14,11 @@ from casadi_hands.verify.flat import Convex
 from casadi_hands.verify.reading.geoms import Geom, read_geom, read_looks
 from casadi_hands.verify.reading.markup import called, name_of, number, numbers, only, positive, read_xml, strangers
 from casadi_hands.verify.reading.points import hull_points
+
+SHORTEST_STEP = 1e-4
+"""s of the simulation; contacts that stiffen within 10 ms need no shorter ones."""
+MOST_ITERATIONS = 1000
+"""Of the engine's solver a step; MuJoCo's own default is 100."""
 
 _SECTIONS = "compiler option statistic default worldbody contact equality tendon actuator keyframe visual asset"
 _OPTIONS = "timestep gravity integrator cone impratio noslip_iterations iterations tolerance solver"
@@ -95,6 +101,7 @@ class Scene:
     Attributes:
         step: of the simulation, s.
         gravity: (3,) m/s².
+        text: the file's content as it was read, comments left out.
         bodies: by name, in the file's order, which is that of MuJoCo's coordinates.
         planes: of the world.
         excluded: pairs of bodies that do not collide.
@@ -108,6 +115,7 @@ class Scene:
 
     step: float
     gravity: np.ndarray
+    text: str
     bodies: dict[str, SceneBody] = field(default_factory=dict)
     planes: list[Geom] = field(default_factory=list)
     excluded: list[frozenset[str]] = field(default_factory=list)
@@ -124,19 +132,23 @@ def read_scene(path: Path) -> Scene:
 
     Raises:
         DesignError: the file is missing or is not XML; a name or a section is given twice; a number is missing or is
-            not finite; angles are not in radians.
+            not finite; angles are not in radians; a replay would take steps without end.
     """
     root = read_xml(path, "mujoco")
     section = {tag: only(path, root, tag) for tag in _SECTIONS.split()}
     option, world = section["option"], section["worldbody"]
     option = Element("option") if option is None else option
     for name in ("impratio", "noslip_iterations", "iterations", "tolerance"):
-        number(path, option, name, "0")
+        if number(path, option, name, "0") > MOST_ITERATIONS:
+            raise DesignError(f"{path}: its {name} is {option.get(name)}; at most {MOST_ITERATIONS} is allowed")
     if world is None:
         raise DesignError(f"{path}: no <worldbody>, so nothing is in the scene")
     if section["compiler"] is None or section["compiler"].get("angle") != "radian":
         raise DesignError(f"{path}: angles are not in radians")
-    scene = Scene(number(path, option, "timestep", "0.002"), numbers(path, option, "gravity", 3, "0 0 -9.81"))
+    step, text = number(path, option, "timestep", "0.002"), ElementTree.tostring(root, encoding="unicode")
+    if step < SHORTEST_STEP:
+        raise DesignError(f"{path}: its timestep is {step:g} s; a replay takes {SHORTEST_STEP:g} s at least")
+    scene = Scene(step, numbers(path, option, "gravity", 3, "0 0 -9.81"), text)
     scene.strange.extend(strangers(root, _SECTIONS, "model"))
     allowed = {"compiler": ("", "angle"), "option": ("", _OPTIONS), "default": ("geom", ""), "contact": ("exclude", "")}
     allowed |= {"tendon": ("fixed", ""), "asset": ("mesh", "")}

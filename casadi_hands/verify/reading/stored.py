@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import struct
-import zipfile
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +9,7 @@ import numpy as np
 
 from casadi_hands.errors import DesignError
 from casadi_hands.problem.motion import Motion
-from casadi_hands.verify.reading.markup import LARGEST
-
-LARGEST_FILE = 1 << 30
-"""Bytes that a motion may take unpacked; hours of samples of a hand of many joints take less."""
+from casadi_hands.problem.stored import LARGEST_NUMBER, read_arrays, read_json
 
 _WORDS = ("joint_names", "contact_names", "contact_link")
 _SHAPES: dict[str, tuple[str | int, ...]] = {
@@ -54,7 +47,7 @@ def read_motion(path: Path) -> Motion:
         DesignError: it cannot be read, lacks an array, or an array has another type or shape, or holds a number that is
             not finite.
     """
-    arrays = _arrays(path)
+    arrays = read_arrays(path, _SHAPES)
     missing = [name for name in _SHAPES if name in _ASKED and name not in arrays]
     if missing:
         raise DesignError(f"{path}: no array {', '.join(missing)}")
@@ -80,24 +73,6 @@ def read_motion(path: Path) -> Motion:
     return Motion(**entries)
 
 
-def _arrays(path: Path) -> dict[str, np.ndarray]:
-    try:
-        with zipfile.ZipFile(path) as archive:
-            entries = archive.infolist()
-        if sum(entry.file_size for entry in entries) > LARGEST_FILE:
-            raise DesignError(f"{path}: unpacked it takes more than {LARGEST_FILE >> 20} MB; no motion does")
-        with np.load(path, allow_pickle=False) as file:
-            twice = sorted({name for name in file.files if file.files.count(name) > 1})
-            if twice:
-                raise DesignError(f"{path}: holds {', '.join(twice)} twice; one would shadow the other")
-            return {name: np.asarray(file[name]) for name in _SHAPES if name in file.files}
-    except (
-        *(OSError, ValueError, KeyError, EOFError, MemoryError, RuntimeError, OverflowError, SyntaxError, TypeError),
-        *(zipfile.BadZipFile, zlib.error, struct.error),
-    ) as error:
-        raise DesignError(f"{path}: not a NumPy archive: {error}") from None
-
-
 def _checked(path: Path, name: str, array: np.ndarray) -> np.ndarray:
     """Return the array in the type that the format has for it.
 
@@ -113,7 +88,7 @@ def _checked(path: Path, name: str, array: np.ndarray) -> np.ndarray:
         raise DesignError(f"{path}: {name} holds {array.dtype}, not real numbers")
     if not np.all(np.isfinite(array)):
         raise DesignError(f"{path}: {name} holds a number that is not finite")
-    if np.any(np.abs(array.astype(np.float64)) > LARGEST):
+    if np.any(np.abs(array.astype(np.float64)) > LARGEST_NUMBER):
         raise DesignError(f"{path}: {name} holds a number too large for anything of a hand")
     return array.astype(np.float64)
 
@@ -125,27 +100,7 @@ def read_record(path: Path) -> dict[str, Any]:
         DesignError: it is not JSON, gives a name twice, holds a number that is not finite, or is of another format.
     """
 
-    def constant(word: str) -> float:
-        raise ValueError(f"it holds {word}, not a finite number")
-
-    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        found: dict[str, Any] = {}
-        for name, value in pairs:
-            if name in found:
-                raise ValueError(f"it gives '{name}' twice; one would shadow the other")
-            found[name] = value
-        return found
-
-    def finite(word: str) -> float:
-        value = float(word)
-        return value if np.isfinite(value) else constant(word)
-
-    try:
-        record = json.loads(
-            path.read_text(encoding="utf-8"), parse_constant=constant, parse_float=finite, object_pairs_hook=once
-        )
-    except (OSError, ValueError, RecursionError) as error:
-        raise DesignError(f"{path}: cannot be read: {error}") from None
+    record = read_json(path)
     if not isinstance(record, dict) or record.get("format") != 1 or isinstance(record.get("format"), bool):
         raise DesignError(f"{path}: not a result of format 1")
     return record
@@ -159,7 +114,7 @@ def as_array(value: Any, shape: tuple[int, ...]) -> np.ndarray | None:
         shape: ``()`` for one number.
     """
     if not shape:
-        good = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST
+        good = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST_NUMBER
         return np.array(float(value)) if good else None
     if not isinstance(value, list) or len(value) != shape[0]:
         return None

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from casadi_hands.errors import DesignError, HandsError
 from casadi_hands.verify.reading.folder import Folder
+from casadi_hands.verify.reading.markup import read_xml
 from casadi_hands.verify.replays.perturb import Perturbation
 from casadi_hands.verify.replays.simulation import one_line
 from casadi_hands.verify.shapes import Shape
@@ -117,10 +118,7 @@ def _palm_moves(root: ElementTree.Element) -> bool:
 
 
 def _read(folder: Folder, name: str) -> ElementTree.Element:
-    try:
-        return ElementTree.parse(folder.path / name).getroot()
-    except (OSError, ElementTree.ParseError) as error:
-        raise DesignError(f"{folder.path / name}: {one_line(error)}") from None
+    return read_xml(folder.path / name, "mujoco" if name == "scene.xml" else "robot")
 
 
 def read_mechanics(folder: Folder, name: str) -> str:

@@ -141,9 +141,14 @@ class Simulation:
             HandsError: MuJoCo is not installed or cannot be loaded.
         """
         self._mujoco = mujoco = load_mujoco()
-        file = folder.path / "scene.xml"
+        file, scene = folder.path / "scene.xml", folder.scene
+        if scene is None:
+            raise DesignError(f"{file}: missing, so there is nothing to replay")
+        if scene.strange:
+            raise DesignError(f"{file}: {scene.strange[0]}")
         try:
-            self.model = mujoco.MjModel.from_xml_path(str(file))
+            # What was read, so that MuJoCo is told nothing else.
+            self.model = mujoco.MjModel.from_xml_string(scene.text)
         except ValueError as error:
             raise DesignError(f"{file}: {error}") from None
         self._find(folder, file)
