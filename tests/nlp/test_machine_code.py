@@ -7,9 +7,11 @@ import inspect
 import logging
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -60,6 +62,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """An empty cache of this test's own, and a process that has seen and said nothing yet."""
     monkeypatch.setenv("CASADI_HANDS_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(machine_code, "_reported", set())
+    monkeypatch.setattr(machine_code, "_given_up", set())
     forget()
     yield tmp_path / "cache"
     forget()
@@ -439,7 +442,7 @@ def test_without_a_home_kernels_are_interpreted(
 def mounted(options: str, then: str) -> tuple[str, ...]:
     """A command to put before a program: the cache is a file system of its own, seen by that program alone."""
     before = ("unshare", "--map-root-user", "--mount", "sh", "-c")
-    mount = f'mkdir -p "$CASADI_HANDS_CACHE" && mount -t tmpfs -o {options} none "$CASADI_HANDS_CACHE"'
+    mount = f'mkdir -p "$CASADI_HANDS_CACHE" && mount -t tmpfs -o mode=700,{options} none "$CASADI_HANDS_CACHE"'
     if not shutil.which("unshare") or subprocess.run([*before, mount], capture_output=True).returncode:
         pytest.skip("no file systems may be mounted here")
     return (*before, f'{mount} && {then} && exec "$@"', "sh")
@@ -528,3 +531,119 @@ def test_processes_that_want_the_same_kernel_at_once_compile_it_once(counting: C
     assert [answers(each) for each in words] == [[True, True]] * 3
     assert counting.count == 2
     assert suffixes(cache) == [".sha256", ".sha256", ".so", ".so"]
+
+
+def test_what_is_kept_nobody_else_can_write(cache: Path) -> None:
+    before = os.umask(0)
+    try:
+        compiled("wave", wave())
+    finally:
+        os.umask(before)
+    assert [path.stat().st_mode & 0o077 for path in (cache, *cache.iterdir())] == [0, 0, 0]
+
+
+def closed(folder: Path) -> None:
+    folder.chmod(0o770)
+
+
+def linked(folder: Path) -> None:
+    folder.parent.chmod(0o777)
+
+
+def anothers(folder: Path) -> None:
+    os.chown(folder, 12345, -1)
+
+
+UNTRUSTED: dict[str, tuple[Callable[[Path], None], str]] = {
+    "writable by a group": (closed, r"others can write .*cache \(chmod go-w\)"),
+    "in a folder that all can write": (linked, "all can write "),
+    "another user's": (anothers, "cache belongs to another user"),
+}
+
+
+@pytest.mark.parametrize("how", UNTRUSTED)
+def test_a_cache_that_others_can_write_is_not_used(how: str, counting: Compiler, cache: Path) -> None:
+    spoil, why = UNTRUSTED[how]
+    if how == "another user's" and os.geteuid() != 0:
+        pytest.skip("only root can give files away")
+    compiled("wave", wave())
+    kept = {path.name: path.read_bytes() for path in cache.iterdir()}
+    spoil(cache)
+    # In a process of its own, at whose end the private folder goes; its child uses the same one.
+    program = PROGRAM + "\nimport os, subprocess, sys\nprint(os.environ['CASADI_HANDS_CACHE'], file=sys.stderr)\n"
+    child = f"subprocess.run([sys.executable, '-c', {PROGRAM!r}], check=True)"
+    process = start(program + child)
+    words, log = process.communicate(timeout=120)
+    assert process.returncode == 0, log
+    said, private = log.splitlines()
+    assert re.search(f"^the cache of compiled kernels is not used, .*: .*{why}", said)
+    assert Path(private).parent == Path(tempfile.gettempdir())
+    assert not Path(private).exists()
+    lines = words.splitlines()
+    assert answers("\n".join(lines[:2])) == answers("\n".join(lines[2:])) == [True, True]
+    assert counting.count == 1 + 2
+    assert {path.name: path.read_bytes() for path in cache.iterdir()} == kept
+
+
+def test_a_library_that_could_be_anothers_is_compiled_again(
+    counting: Compiler, cache: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    compiled("wave", wave())
+    (library,) = cache.glob("*.so")
+    elsewhere = library.rename(tmp_path / "elsewhere.so")
+    library.symlink_to(elsewhere)
+    kept = elsewhere.read_bytes()
+    assert is_compiled(compiled("wave", wave()))
+    assert counting.count == 2
+    assert not library.is_symlink()
+    assert elsewhere.read_bytes() == kept
+    library.chmod(0o666)
+    assert is_compiled(compiled("wave", wave()))
+    assert counting.count == 3
+    assert [message.rpartition(":")[0] for message in caplog.messages] == [
+        "kernel 'wave' is compiled again: its library in the cache could be another's"
+    ] * 2
+
+
+def test_a_lock_that_leads_elsewhere_is_not_followed(tmp_path: Path) -> None:
+    (tmp_path / "precious").write_text("content")
+    (tmp_path / "lock").symlink_to(tmp_path / "precious")
+    with pytest.raises(OSError, match="lock"), machine_code._locked(tmp_path / "lock"):
+        raise AssertionError
+    assert (tmp_path / "precious").read_text() == "content"
+
+
+@pytest.mark.parametrize("where", ["kernel", "version"])
+def test_a_compiler_that_never_returns_is_given_up(
+    where: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    hanging, pids = tmp_path / "hanging-cc", tmp_path / "pids"
+    # As a driver does: what hangs is a child of its own.
+    hang = f"sleep 1000 & echo $! $$ >> {pids}; wait"
+    lines = ["#!/bin/sh", f'[ "$1" = --version ] && {{ {hang if where == "version" else "echo one"}; exit; }}', hang]
+    hanging.write_text("\n".join(lines) + "\n")
+    hanging.chmod(0o755)
+    monkeypatch.setenv("CC", str(hanging))
+    monkeypatch.setattr(machine_code, "PATIENCE", 1.0)
+    monkeypatch.setattr(machine_code, "VERSION_PATIENCE", 1.0)
+    begun = time.monotonic()
+    for shift in range(4):
+        functions = wave(float(shift))
+        assert compiled("wave", functions) == functions
+    assert time.monotonic() - begun < 4.0  # it was tried once
+    assert caplog.messages == [
+        f"kernels are interpreted, which is several times slower; 'wave': {hanging} has not returned for 1 s and is "
+        "given up"
+    ]
+    assert len(pids.read_text().splitlines()) == 1
+    while any(running(int(pid)) for pid in pids.read_text().split()):
+        assert time.monotonic() - begun < 30.0
+        time.sleep(0.05)
+
+
+def running(pid: int) -> bool:
+    """Whether a process runs; one that has ended and whom nobody has waited for does not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
