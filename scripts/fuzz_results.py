@@ -1,6 +1,6 @@
 """Spoil result folders thousands of times, read them in every way there is, and count what goes wrong.
 
-``python scripts/fuzz_results.py results/gallery/circle --count 2000``; ``--only N`` spoils as number N does and says
+``OMP_NUM_THREADS=1 python scripts/fuzz_results.py results/gallery/circle --count 2000``; ``--only N`` spoils as number N does and says
 what becomes of it. Every reading is in a process of its own with limits on time and memory.
 """
 
@@ -13,22 +13,17 @@ import random
 import resource
 import shutil
 import signal
-import sys
 import tempfile
 import time
 import traceback
 from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
-
-from mutants import mutate
+from mutants import FILES, mutate
 
 from casadi_hands.errors import HandsError
 from casadi_hands.export.design import Design
@@ -76,7 +71,7 @@ class Reading:
             return "slow"
         if len(self.message) > LONGEST:
             return "long message"
-        return "control characters" if any(ord(c) < 32 and c != "\n" or ord(c) == 127 for c in self.message) else ""
+        return "control characters" if not self.message.replace("\n", "").isprintable() else ""
 
 
 def _audit(folder: Path, task: Task) -> str:
@@ -127,6 +122,21 @@ WAYS: dict[str, Way] = {
     "export": _export,
     "drake": _drake,
 }
+
+
+_DESIGN = ("task.yaml", "motion.npz", "result.json")
+_READS = {way: _DESIGN for way in ("load", "view", "from", "export")}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one spoilt folder: ``spoilt`` says how it was, ``megabytes`` is the memory its readings took."""
+
+    number: int
+    source: str
+    spoilt: str
+    readings: list[Reading]
+    megabytes: float
 
 
 @cache
@@ -183,63 +193,61 @@ def _tried(folder: Path, task: Task, read: Way) -> dict[str, Any]:
     return {"what": what, "message": message[: 3 * LONGEST], "seconds": time.process_time() - begun}
 
 
-def fuzz(sources: list[Path], numbers: range, seed: int, ways: list[str]) -> Iterator[dict[str, Any]]:
+def fuzz(sources: list[Path], numbers: Iterable[int], seed: int, ways: list[str]) -> Iterator[Outcome]:
     """Yield what became of each spoilt folder.
 
     Args:
         sources: result folders.
         numbers: of the mutants; each has its own seed.
         seed: of all of them.
-        ways: to read, of `WAYS`.
+        ways: to read, of `WAYS`; of these, those that look at a spoilt file.
     """
     for number in numbers:
         source = sources[number % len(sources)]
         task = _loaded(source)
         with tempfile.TemporaryDirectory() as scratch:
             folder = Path(scratch) / "result"
-            shutil.copytree(
-                source,
-                folder,
-                ignore=lambda _, names: (
-                    set(names) - set(os.listdir(source)) | {"viewer.html", "alternatives", "export"}
-                ),
-            )
+            folder.mkdir()
+            for name in FILES:
+                if (source / name).is_file():
+                    shutil.copy(source / name, folder)
             spoilt = mutate(folder, random.Random(f"{seed}:{number}"))
-            readings, megabytes = read_in_every_way(folder, task, {way: WAYS[way] for way in ways})
-        yield {"number": number, "source": source.name, "spoilt": spoilt, "readings": readings, "megabytes": megabytes}
+            chosen = {way: WAYS[way] for way in ways if any(name in spoilt for name in _READS.get(way, FILES))}
+            yield Outcome(number, source.name, spoilt, *read_in_every_way(folder, task, chosen))
 
 
 def main() -> None:
-    """Run, and print counts and findings."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    """Run, and print findings, what was certified, and counts."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", nargs="+", type=Path, help="result folders")
-    parser.add_argument("--count", type=int, default=200)
-    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--count", type=int, default=200, help="how many are spoilt")
+    parser.add_argument("--first", type=int, default=0, help="number of the first")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--only", type=int)
-    parser.add_argument("--ways", default=",".join([way for way in WAYS if way != "drake"]))
+    parser.add_argument("--only", type=int, help="number of the one to spoil")
+    parser.add_argument("--ways", default=",".join(way for way in WAYS if way != "drake"), help="to read them")
     options = parser.parse_args()
-    last = options.first + options.count
-    numbers = range(options.first, last) if options.only is None else range(options.only, options.only + 1)
+    one = options.only is not None
+    numbers = range(options.only, options.only + 1) if one else range(options.first, options.first + options.count)
     counts: Counter[str] = Counter()
-    most = {"seconds": 0.0, "megabytes": 0.0, "characters": 0}
+    most = {"seconds": 0.0, "megabytes": 0.0, "characters": 0.0}
     for each in fuzz(options.folders, numbers, options.seed, options.ways.split(",")):
-        most["megabytes"] = max(most["megabytes"], each["megabytes"])
-        if each["megabytes"] > MEGABYTES:
-            counts["large"] += 1
-            print(f"{each['number']} {each['source']}: {each['spoilt']}: {each['megabytes']:.0f} MB", flush=True)
-        for reading in each["readings"]:
-            counts[f"{reading.way} {reading.what}"] += 1
+        counts["folders"] += 1
+        most["megabytes"] = max(most["megabytes"], each.megabytes)
+        begin = f"{each.number} {each.source}: {each.spoilt}"
+        if each.megabytes > MEGABYTES:
+            counts["finding: large"] += 1
+            print(f"{begin}: {each.megabytes:.0f} MB", flush=True)
+        for reading in each.readings:
+            counts[f"{reading.way}: {reading.what}"] += 1
             most["seconds"] = max(most["seconds"], reading.seconds)
             most["characters"] = max(most["characters"], len(reading.message))
-            if reading.wrong or reading.what == "certified" or options.only is not None:
-                counts[f"finding: {reading.wrong}"] += bool(reading.wrong)
-                text = reading.message if options.only is not None else " ".join(reading.message[-300:].split())
-                print(
-                    f"{each['number']} {each['source']}: {each['spoilt']}: {reading.way} {reading.what} {reading.wrong} {reading.seconds:.1f} s: {text}",
-                    flush=True,
-                )
-    print(json.dumps({"counts": dict(sorted(counts.items())), **most}, indent=1))
+            if reading.wrong:
+                counts[f"finding: {reading.wrong}"] += 1
+            if reading.wrong or reading.what == "certified" or one:
+                words = reading.message if one else " ".join(reading.message[-300:].split())
+                how = f"{reading.way} {reading.what} {reading.wrong} in {reading.seconds:.1f} s"
+                print(f"{begin}: {how}: {words}", flush=True)
+    print(json.dumps({"counts": dict(sorted(counts.items())), "most": most}, indent=1))
 
 
 if __name__ == "__main__":

@@ -7,11 +7,11 @@ from typing import Any
 
 from casadi_hands.errors import DesignError, TaskError
 from casadi_hands.export.arrays import load_motion, save_motion
+from casadi_hands.export.checked import read_record
 from casadi_hands.export.commands import commanded
 from casadi_hands.export.meshes import FOLDER, mesh_files
 from casadi_hands.export.mjcf import scene_mjcf
 from casadi_hands.export.page.page import write_page
-from casadi_hands.export.checked import read_record
 from casadi_hands.export.record import STATUSES, design_record, hand_from_record, record_text
 from casadi_hands.export.table import motion_table
 from casadi_hands.export.urdf import hand_urdf, object_urdf

@@ -172,7 +172,7 @@ def _array(path: Path, name: str, content: bytes) -> np.ndarray:
     read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     shape, _, kind = read_header(file)
     if kind.kind not in "bfiuU" or kind.names is not None:
-        raise DesignError(f"{path}: {name} holds {str(kind)[:60]}, neither numbers nor truth nor words")
+        raise DesignError(f"{path}: {name} holds {str(kind)[:60]}, not real numbers, truth or words")
     count, size = math.prod(shape), len(content) - file.tell()
     if min(shape, default=0) < 0 or count * kind.itemsize != size or count > len(content):
         raise DesignError(f"{path}: {name} says that it has the shape {str(shape)[:60]}, and holds {size} bytes")

@@ -83,5 +83,5 @@ def test_an_incomplete_file_is_refused(tmp_path):
 
 def test_another_kind_of_file_is_refused(tmp_path):
     (tmp_path / "motion.npz").write_text("not a zip file")
-    with pytest.raises(DesignError, match="not a motion file"):
+    with pytest.raises(DesignError, match="not a NumPy archive"):
         load_motion(tmp_path / "motion.npz")

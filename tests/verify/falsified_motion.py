@@ -112,7 +112,7 @@ NO_NUMBERS: Cases = {
     "complex angles": (arrays(joint_angles=lambda a: a + 0j), r"joint_angles holds complex128, not real numbers"),
     "complex nan": (arrays(contact_force=lambda a: a + 1j * np.nan), r"contact_force holds complex128"),
     "times of words": (arrays(time=lambda a: a.astype(str)), r"time holds <U\d+, not real numbers"),
-    "objects": (arrays(time=lambda a: a.astype(object)), r"motion\.npz: not a NumPy archive"),
+    "objects": (arrays(time=lambda a: a.astype(object)), r"time holds object, not real numbers"),
     "activity of numbers": (
         arrays(contact_active=lambda a: 0.5 * a),
         r"contact_active holds float64, not true and false",

@@ -145,7 +145,10 @@ IN_THE_SCENE: Cases = {
         ),
         r"it has springs, though every joint has a motor of its own",
     ),
-    "an included file": (added(SCENE, "worldbody", "<include file='x.xml'/>"), r"<include> in <worldbody>"),
+    "an included file": (
+        added(SCENE, "worldbody", "<include file='x.xml'/>"),
+        r"<include> would have a reader open other files",
+    ),
     "a default of no collisions": (attribute(SCENE, "default/geom", "conaffinity", "0"), r"no attribute conaffinity"),
     "a keyframe's pose": (
         attribute(SCENE, ".//key[@name='goal2']", "qpos", lambda v: "1 " + v.partition(" ")[2]),

@@ -99,7 +99,6 @@ def read_record(path: Path) -> dict[str, Any]:
     Raises:
         DesignError: it is not JSON, gives a name twice, holds a number that is not finite, or is of another format.
     """
-
     record = read_json(path)
     if not isinstance(record, dict) or record.get("format") != 1 or isinstance(record.get("format"), bool):
         raise DesignError(f"{path}: not a result of format 1")
