@@ -1,7 +1,7 @@
 """Spoil result folders thousands of times, read them in every way there is, and count what goes wrong.
 
-``OMP_NUM_THREADS=1 python scripts/fuzz_results.py results/gallery/circle --count 2000``; ``--only N`` spoils as number N does and says
-what becomes of it. Every reading is in a process of its own with limits on time and memory.
+``OMP_NUM_THREADS=1 python scripts/fuzz_results.py results/gallery/circle --count 2000``; ``--only N`` spoils as number
+N does and says what becomes of it. Every reading is in a process of its own with limits on time and memory.
 """
 
 from __future__ import annotations

@@ -186,8 +186,8 @@ def check(task: TaskFile) -> None:
 
 @app.command()
 def view(folder: Folder) -> None:
-    """Open a design's page in the browser: the hand and the object moving."""
-    from casadi_hands.export.page.page import open_page
+    """Open a design's page in the browser, made anew where it is not what the folder's other files give."""
+    from casadi_hands.export.page.own_page import open_page
 
     print(open_page(folder))
 

@@ -55,7 +55,8 @@ def read_bytes(path: Path, most: int) -> bytes:
     """Return a file's content.
 
     Raises:
-        DesignError: it is missing, no file (a pipe, a device, a folder), cannot be read, or has more than ``most`` bytes.
+        DesignError: it is missing, no file (a pipe, a device, a folder), cannot be read, or has more
+            than ``most`` bytes.
     """
     try:
         if not stat.S_ISREG(path.stat().st_mode):
@@ -116,11 +117,11 @@ def read_json(path: Path) -> Any:
 
 
 def read_arrays(path: Path, names: Collection[str]) -> dict[str, np.ndarray]:
-    """Return the arrays of a NumPy archive that have these names; what each claims to be is looked at before it is read.
+    """Return the arrays of a NumPy archive that have these names; what each claims to be is looked at first.
 
     Raises:
-        DesignError: as `read_bytes`, or it is not such an archive, holds a name twice, is large unpacked, or an array is
-            of anything but numbers, truth and printable words.
+        DesignError: as `read_bytes`, or it is not such an archive, holds a name twice, is large unpacked, or an array
+            is of anything but numbers, truth and printable words.
     """
     content = read_bytes(path, LARGEST_ARRAYS)
     try:

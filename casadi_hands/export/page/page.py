@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import webbrowser
 from base64 import b64encode
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +12,6 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from casadi_hands.errors import DesignError
 from casadi_hands.export.page.scene import Scene, draw_scene
 
 if TYPE_CHECKING:
@@ -44,6 +42,11 @@ def write_page(design: Result, path: Path, time: float | None = None, menu: Sequ
         time: where the page rests when opened without a fragment, s; None to play.
         menu: pages of other designs to switch to; without any there is no menu.
     """
+    path.write_text(page_text(design, time, menu), encoding="utf-8")
+
+
+def page_text(design: Result, time: float | None = None, menu: Sequence[MenuEntry] = ()) -> str:
+    """The page of a design, the same for the same design; arguments as of `write_page`."""
     scene = draw_scene(design)
     parts = {
         "title": escape(design.task.name),
@@ -57,27 +60,7 @@ def write_page(design: Result, path: Path, time: float | None = None, menu: Sequ
         "meshcat": files("meshcat").joinpath("viewer/dist/main.min.js").read_text(encoding="utf-8"),
     }
     page = files("casadi_hands.export.page").joinpath("page.html").read_text(encoding="utf-8")
-    path.write_text(re.sub(r"\{\{(\w+)\}\}", lambda slot: parts[slot[1]], page), encoding="utf-8")
-
-
-def open_page(directory: Path) -> Path:
-    """Open a result folder's page in the browser.
-
-    Args:
-        directory: a result folder.
-
-    Returns:
-        The page's path.
-
-    Raises:
-        DesignError: the folder has no page, or there is no browser to open it in.
-    """
-    page = directory / "viewer.html"
-    if not page.is_file():
-        raise DesignError(f"{directory}: no viewer.html here; give a folder that `casadi-hands solve` wrote")
-    if not webbrowser.open(page.resolve().as_uri()):
-        raise DesignError(f"no browser found; open {page.resolve()} in one yourself")
-    return page
+    return re.sub(r"\{\{(\w+)\}\}", lambda slot: parts[slot[1]], page)
 
 
 def _summary(design: Result, scene: Scene) -> str:

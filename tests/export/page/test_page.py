@@ -11,9 +11,8 @@ import pinocchio as pin
 import pytest
 import umsgpack
 
-from casadi_hands.errors import DesignError
 from casadi_hands.export.design import Design
-from casadi_hands.export.page.page import MenuEntry, open_page, write_page
+from casadi_hands.export.page.page import MenuEntry, write_page
 from casadi_hands.export.urdf import hand_urdf
 from casadi_hands.task import parse_task
 from tests.export.example import TASK, example_design, example_hand, example_motion, example_task
@@ -183,18 +182,3 @@ def test_a_design_without_motion_stands_still(tmp_path):
 def test_a_page_can_open_at_a_time(tmp_path):
     write_page(example_design(), tmp_path / "viewer.html", time=1.5)
     assert embedded(tmp_path / "viewer.html")[0]["start"] == 1.5
-
-
-def test_opening_a_folder_without_a_page_is_refused(tmp_path):
-    with pytest.raises(DesignError, match=r"no viewer\.html here"):
-        open_page(tmp_path)
-
-
-def test_the_page_opens_in_the_browser_by_its_address(page, monkeypatch):
-    opened = []
-    monkeypatch.setattr("webbrowser.open", lambda address: opened.append(address) or True)
-    assert open_page(page.parent) == page
-    assert opened == [page.as_uri()]
-    monkeypatch.setattr("webbrowser.open", lambda address: False)
-    with pytest.raises(DesignError, match="no browser found"):
-        open_page(page.parent)
