@@ -27,22 +27,22 @@ def cluster(address: str) -> Iterator[Executor]:
     """An executor of the workers of a dask.distributed scheduler; what has not begun is cancelled at the end.
 
     Args:
-        address: ``dask://HOST:PORT``.
+        address: ``dask://HOST:PORT``, or ``dask+tls://HOST:PORT`` with the certificates that dask's own settings name.
 
     Raises:
         SolveError: the address is of another form, dask.distributed is not installed, nobody answers, a worker
             could give other numbers than this machine, or the cluster loses a trial.
     """
-    match = re.fullmatch(r"dask://([\w.-]+|\[[\da-fA-F:]+\]):(\d{1,5})", address)
+    match = re.fullmatch(r"dask(\+tls)?://([\w.-]+|\[[\da-fA-F:]+\]):(\d{1,5})", address)
     if not match:
-        raise SolveError(f"executor: given {address!r}; allowed: dask://HOST:PORT")
+        raise SolveError(f"executor: given {address!r}; allowed: dask://HOST:PORT, dask+tls://HOST:PORT")
     try:
         from distributed import KilledWorker
     except ImportError as error:
         raise SolveError(f"{address} needs dask.distributed: pip install 'casadi-hands[dask]'") from error
     # What ends the solve is told as one error; the client would log it with a traceback as well.
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
-    client = _connected(address, f"tcp://{match[1]}:{match[2]}")
+    client = _connected(address, f"{'tls' if match[1] else 'tcp'}://{match[2]}:{match[3]}")
     try:
         _check_workers(address, client)
         # The same call twice is two calls, not one whose result is looked up.
@@ -53,7 +53,7 @@ def cluster(address: str) -> Iterator[Executor]:
         client.close()
 
 
-def _connected(address: str, tcp: str) -> Client:
+def _connected(address: str, plain: str) -> Client:
     """A client of a scheduler that answers and has workers.
 
     Raises:
@@ -63,8 +63,11 @@ def _connected(address: str, tcp: str) -> Client:
 
     try:
         # A client would wait without end for one that takes the connection and says nothing.
-        asyncio.run(asyncio.wait_for(_greet(tcp), PATIENCE))
-        client = Client(tcp, timeout=PATIENCE, set_as_default=False)
+        asyncio.run(asyncio.wait_for(_greet(plain), PATIENCE))
+        client = Client(plain, timeout=PATIENCE, set_as_default=False)
+    except (TypeError, RuntimeError) as error:
+        # What distributed raises where settings name no certificates.
+        raise SolveError(f"{address}: {error}; see docs/how-to/cluster.md for the settings of TLS") from error
     except (OSError, ValueError, MemoryError) as error:
         # MemoryError, because what another kind of server says is read as the length of a message.
         raise SolveError(f"{address}: no dask scheduler answers there") from error
@@ -76,10 +79,11 @@ def _connected(address: str, tcp: str) -> Client:
     return client
 
 
-async def _greet(tcp: str) -> None:
+async def _greet(plain: str) -> None:
     from distributed.comm.core import connect
+    from distributed.security import Security
 
-    comm = await connect(tcp, timeout=PATIENCE)
+    comm = await connect(plain, timeout=PATIENCE, **Security().get_connection_args("client"))
     await comm.close()
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import builtins
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -250,3 +251,65 @@ def test_a_whole_task_gives_the_very_files_of_local_processes(workers: LocalClus
     solve(parse_task(BALL + SEARCH), jobs=2, out=tmp_path / "here")
     for name in ("motion.npz", "hand.urdf", "scene.xml"):
         assert (tmp_path / "away" / name).read_bytes() == (tmp_path / "here" / name).read_bytes()
+
+
+@pytest.fixture
+def certificates(tmp_path: Path) -> dict[str, str]:
+    """Settings of dask's TLS, with an authority and a certificate of this test's own."""
+    openssl = shutil.which("openssl")
+    if openssl is None:
+        pytest.skip("no openssl to make certificates with")
+    names = ["ca.key", "ca.pem", "own.key", "own.csr", "own.pem"]
+    authority_key, authority, key, request, certificate = (str(tmp_path / name) for name in names)
+    new = [openssl, "req", "-newkey", "rsa:2048", "-nodes", "-subj"]
+    for command in (
+        [*new, "/CN=authority", "-x509", "-days", "1", "-keyout", authority_key, "-out", authority],
+        [*new, "/CN=own", "-keyout", key, "-out", request],
+        [
+            *(openssl, "x509", "-req", "-days", "1", "-in", request, "-CA", authority, "-CAkey", authority_key),
+            *("-CAcreateserial", "-out", certificate),
+        ],
+    ):
+        subprocess.run(command, check=True, capture_output=True)
+    settings = {"distributed.comm.tls.ca-file": authority, "distributed.comm.require-encryption": "true"}
+    for who in ("scheduler", "worker", "client"):
+        settings |= {f"distributed.comm.tls.{who}.{what}": path for what, path in (("key", key), ("cert", certificate))}
+    return settings
+
+
+def test_a_cluster_is_reached_by_tls_and_not_without_its_certificates(certificates: dict[str, str]) -> None:
+    variables = {
+        f"DASK_{name.upper().replace('.', '__').replace('-', '_')}": each for name, each in certificates.items()
+    }
+    environment = {**os.environ, **variables, "OMP_NUM_THREADS": "1"}
+    with socket.socket() as found:
+        found.bind(("127.0.0.1", 0))
+        port = found.getsockname()[1]
+    python, address = [sys.executable, "-m"], f"tls://127.0.0.1:{port}"
+    commands = (
+        [*python, "distributed.cli.dask_scheduler", "--host", address, "--no-dashboard"],
+        [*python, "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"],
+    )
+    running = [subprocess.Popen(each, env=environment, stderr=subprocess.DEVNULL) for each in commands]
+    address = f"dask+{address}"
+    try:
+        with dask.config.set(certificates):
+            for _ in range(30):
+                try:
+                    with cluster(address) as executor:
+                        assert set(run_all(executor, pid, [(i,) for i in range(3)], lambda *_: None)) == {
+                            running[1].pid
+                        }
+                    break
+                except SolveError:
+                    time.sleep(1.0)
+            else:
+                pytest.fail("no cluster answered")
+        with pytest.raises(SolveError, match="TLS"), cluster(address):
+            raise AssertionError
+        with pytest.raises(SolveError, match="no dask scheduler answers"), cluster(address.replace("+tls", "")):
+            raise AssertionError
+    finally:
+        for process in running:
+            process.terminate()
+            process.wait()
