@@ -230,24 +230,26 @@ def main() -> None:
     numbers = range(options.only, options.only + 1) if one else range(options.first, options.first + options.count)
     counts: Counter[str] = Counter()
     most = {"seconds": 0.0, "megabytes": 0.0, "characters": 0.0}
-    for each in fuzz(options.folders, numbers, options.seed, options.ways.split(",")):
-        counts["folders"] += 1
-        most["megabytes"] = max(most["megabytes"], each.megabytes)
-        begin = f"{each.number} {each.source}: {each.spoilt}"
-        if each.megabytes > MEGABYTES:
-            counts["finding: large"] += 1
-            print(f"{begin}: {each.megabytes:.0f} MB", flush=True)
-        for reading in each.readings:
-            counts[f"{reading.way}: {reading.what}"] += 1
-            most["seconds"] = max(most["seconds"], reading.seconds)
-            most["characters"] = max(most["characters"], len(reading.message))
-            if reading.wrong:
-                counts[f"finding: {reading.wrong}"] += 1
-            if reading.wrong or reading.what == "certified" or one:
-                words = reading.message if one else " ".join(reading.message[-300:].split())
-                how = f"{reading.way} {reading.what} {reading.wrong} in {reading.seconds:.1f} s"
-                print(f"{begin}: {how}: {words}", flush=True)
-    print(json.dumps({"counts": dict(sorted(counts.items())), "most": most}, indent=1))
+    try:
+        for each in fuzz(options.folders, numbers, options.seed, options.ways.split(",")):
+            counts["folders"] += 1
+            most["megabytes"] = max(most["megabytes"], each.megabytes)
+            begin = f"{each.number} {each.source}: {each.spoilt}"
+            if each.megabytes > MEGABYTES:
+                counts["finding: large"] += 1
+                print(f"{begin}: {each.megabytes:.0f} MB", flush=True)
+            for reading in each.readings:
+                counts[f"{reading.way}: {reading.what}"] += 1
+                most["seconds"] = max(most["seconds"], reading.seconds)
+                most["characters"] = max(most["characters"], len(reading.message))
+                if reading.wrong:
+                    counts[f"finding: {reading.wrong}"] += 1
+                if reading.wrong or reading.what == "certified" or one:
+                    words = reading.message if one else " ".join(reading.message[-300:].split())
+                    how = f"{reading.way} {reading.what} {reading.wrong} in {reading.seconds:.1f} s"
+                    print(f"{begin}: {how}: {words}", flush=True)
+    finally:  # also of a run that is interrupted
+        print(json.dumps({"counts": dict(sorted(counts.items())), "most": most}, indent=1))
 
 
 if __name__ == "__main__":
