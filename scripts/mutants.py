@@ -11,6 +11,7 @@ import re
 import shutil
 import zipfile
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -18,6 +19,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 FILES = ("task.yaml", "hand.urdf", "object.urdf", "scene.xml", "motion.npz", "motion.csv", "result.json")
+_LARGE = 50_000_000  # bytes, which no mutation reads
 _XML = ("hand.urdf", "object.urdf", "scene.xml")
 _WORDS = (
     *("", "0", "-1", "1e-9", "1e9", "1e308", "1e999", "nan", "inf", "-inf", "null", "true", "0x10", "1_000", "１", "½"),
@@ -62,8 +64,8 @@ def mutate(folder: Path, source: random.Random) -> str:
 def _rehash(folder: Path) -> list[str]:
     """State the hash of ``task.yaml`` as it is now, as somebody would who means ill."""
     try:
-        record = json.loads((folder / "result.json").read_text())
-        record["task_hash"] = hashlib.sha256((folder / "task.yaml").read_bytes()).hexdigest()
+        record = json.loads(_read(folder / "result.json"))
+        record["task_hash"] = hashlib.sha256(_read(folder / "task.yaml")).hexdigest()
         (folder / "result.json").write_text(json.dumps(record))
     except (OSError, ValueError, TypeError, RecursionError):
         return []
@@ -71,7 +73,7 @@ def _rehash(folder: Path) -> list[str]:
 
 
 def _read(path: Path) -> bytes:
-    return path.read_bytes() if path.is_file() else b""
+    return path.read_bytes() if path.is_file() and path.stat().st_size < _LARGE else b""
 
 
 def _truncated(folder: Path, source: random.Random) -> str:
@@ -103,51 +105,64 @@ def _write(path: Path, content: bytes) -> None:
 def _foreign(folder: Path, source: random.Random) -> str:
     name = source.choice(FILES)
     path, other = folder / name, folder / source.choice(FILES)
-    laughs = "".join(f'<!ENTITY a{i} "{f"&a{i - 1};" * 10}">' for i in range(1, 10))
-    contents: dict[str, bytes] = {
-        "nothing": b"",
-        "noise": source.randbytes(3000),
-        "zeros": bytes(5000),
-        "a picture": b"\x89PNG\r\n\x1a\n" + source.randbytes(500),
-        other.name: _read(other),
-        "UTF-16": _read(path).decode("utf-8", "replace").encode("utf-16"),
-        "a byte order mark": b"\xef\xbb\xbf" + _read(path),
-        "Latin-1": "é".encode("latin-1") + _read(path),
-        "an unknown encoding": b'<?xml version="1.0" encoding="klingon"?>' + _read(path),
-        "a wide encoding": b'<?xml version="1.0" encoding="utf-32"?>' + _read(path),
-        "brackets": b"[" * 200_000,
-        "braces": b'{"a":' * 200_000,
-        "elements": b"<robot>" * 100_000,
-        "an entity": b'<!DOCTYPE r [<!ENTITY e SYSTEM "file:///etc/passwd">]><robot>&e;</robot>',
-        "laughter": f'<!DOCTYPE r [<!ENTITY a0 "ha">{laughs}]><mujoco>&a9;</mujoco>'.encode(),
-        "30 MB of words": b"word " * 6_000_000,
-        "30 MB of lists": b"[" + b"[]," * 10_000_000 + b"[]]",
-        "a million bodies": b"<mujoco><worldbody>" + b"<body/>" * 1_000_000 + b"</worldbody></mujoco>",
-        "a bomb": _archive({"time": _header("<f8", (150_000_000,)) + bytes(1_200_000_000)} if name[-1] == "z" else {}),
-        "many members": _archive({f"a{i}": b"" for i in range(50_000)}),
-    }
-    special = ("a folder", "missing", "a pipe", "zeros without end", "a link to nothing", "four gigabytes")
-    chosen = (
-        source.choice((*contents, *special)) if name[-1] == "z" else source.choice((*list(contents)[:-2], *special))
-    )
-    if chosen in contents:
-        _write(path, contents[chosen])
-        return f"{name} is {chosen}"
-    if path.is_dir():
-        shutil.rmtree(path)
-    path.unlink(missing_ok=True)
-    if chosen == "a folder":
+    special = _SPECIAL if name != "motion.npz" else (*_SPECIAL, "a bomb", "many members")
+    chosen = source.choice((*_contents(b"", b"", b"", other.name), *special))
+    if chosen in (made := _contents(_read(path), _read(other), source.randbytes(3000), other.name)):
+        _write(path, made[chosen]())
+    elif chosen in ("a bomb", "many members"):
+        _write(path, _bomb() if chosen == "a bomb" else _archive({f"a{i}": b"" for i in range(20_000)}))
+    else:
+        _make(path, chosen)
+    return f"{name} is {chosen}"
+
+
+def _make(path: Path, what: str) -> None:
+    """Put what is no common file in a file's place."""
+    _write(path, b"")
+    path.unlink()
+    if what == "a folder":
         path.mkdir()
-    elif chosen == "a pipe":
+    elif what == "a pipe":
         os.mkfifo(path)
-    elif chosen == "zeros without end":
-        path.symlink_to("/dev/zero")
-    elif chosen == "a link to nothing":
-        path.symlink_to("nothing")
-    elif chosen == "four gigabytes":
+    elif what in (links := {"zeros without end": "/dev/zero", "a link to nothing": "nothing"}):
+        path.symlink_to(links[what])
+    elif what == "four gigabytes":
         path.touch()
         os.truncate(path, 4 << 30)
-    return f"{name} is {chosen}"
+
+
+_SPECIAL = ("a folder", "missing", "a pipe", "zeros without end", "a link to nothing", "four gigabytes")
+
+
+def _contents(own: bytes, other: bytes, noise: bytes, name: str) -> dict[str, Callable[[], bytes]]:
+    """What a file may hold instead, by what to call it."""
+    laughs = "".join(f'<!ENTITY a{i} "{f"&a{i - 1};" * 10}">' for i in range(1, 10))
+    return {
+        "nothing": lambda: b"",
+        "noise": lambda: noise,
+        "zeros": lambda: bytes(5000),
+        "a picture": lambda: b"\x89PNG\r\n\x1a\n" + noise,
+        name: lambda: other,
+        "UTF-16": lambda: own.decode("utf-8", "replace").encode("utf-16"),
+        "a byte order mark": lambda: b"\xef\xbb\xbf" + own,
+        "Latin-1": lambda: "é".encode("latin-1") + own,
+        "an unknown encoding": lambda: b'<?xml version="1.0" encoding="klingon"?>' + own,
+        "a wide encoding": lambda: b'<?xml version="1.0" encoding="utf-32"?>' + own,
+        "brackets": lambda: b"[" * 200_000,
+        "braces": lambda: b'{"a":' * 200_000,
+        "elements": lambda: b"<robot>" * 100_000,
+        "an entity": lambda: b'<!DOCTYPE r [<!ENTITY e SYSTEM "file:///etc/passwd">]><robot>&e;</robot>',
+        "laughter": lambda: f'<!DOCTYPE r [<!ENTITY a0 "ha">{laughs}]><mujoco>&a9;</mujoco>'.encode(),
+        "30 MB of words": lambda: b"word " * 6_000_000,
+        "7 MB of lists": lambda: b"[" + b"[]," * 2_500_000 + b"[]]",
+        "a million bodies": lambda: b"<mujoco><worldbody>" + b"<body/>" * 1_000_000 + b"</worldbody></mujoco>",
+    }
+
+
+@cache
+def _bomb() -> bytes:
+    """A megabyte that unpacks to more than one gigabyte."""
+    return _archive({"time": _header("<f8", (150_000_000,)) + bytes(1_200_000_000)})
 
 
 def _archive(members: dict[str, bytes]) -> bytes:

@@ -68,7 +68,8 @@ def _check_own(path: Path, element: Element) -> None:
     Raises:
         DesignError: the element does, or has an attribute that cannot be printed.
     """
-    if element.tag in _OPENING or not _FILES.isdisjoint(element.attrib):
+    named = {} if element.tag == "mesh" and "file" not in element.attrib else element.attrib
+    if element.tag in _OPENING or not _FILES.isdisjoint(named):
         raise DesignError(
             f"{path}: {called(element)} would have a reader open other files, run a plugin or make copies"
         )

@@ -8,11 +8,10 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from casadi_hands.errors import DesignError
-from casadi_hands.verify.reading.markup import LARGEST
+from casadi_hands.problem.stored import LARGEST_NUMBER, read_text
 
 MOST = 10_000
 """Corners of one polytope."""
-_LARGEST_FILE = 1 << 22  # bytes
 
 
 def read_points(path: Path, name: str) -> np.ndarray:
@@ -32,14 +31,10 @@ def read_points(path: Path, name: str) -> np.ndarray:
     if not file.resolve().is_relative_to(path.parent.resolve()):
         raise DesignError(f"{path}: mesh '{name[:60]}' leads out of the folder")
     try:
-        if file.stat().st_size > _LARGEST_FILE:
-            raise DesignError(f"{file}: larger than {_LARGEST_FILE >> 20} MB")
-        lines = [line.split() for line in file.read_text(encoding="utf-8").splitlines()]
+        lines = [line.split() for line in read_text(file).splitlines()]
         rows = [[float(word) for word in line[1:]] for line in lines if line and line[0] == "v"]
         return hull_points(file, np.array(rows, float).ravel())
-    except FileNotFoundError:
-        raise DesignError(f"{file}: missing") from None
-    except (OSError, ValueError) as error:
+    except ValueError as error:
         raise DesignError(f"{file}: not a mesh: {error}") from None
 
 
@@ -49,7 +44,7 @@ def hull_points(path: Path, flat: np.ndarray) -> np.ndarray:
     Raises:
         DesignError: they are not threes of finite numbers, are too many, or lie in one plane.
     """
-    if not 12 <= flat.size <= 3 * MOST or flat.size % 3 or not np.all(np.abs(flat) < LARGEST):
+    if not 12 <= flat.size <= 3 * MOST or flat.size % 3 or not np.all(np.abs(flat) < LARGEST_NUMBER):
         raise DesignError(f"{path}: a polytope has 4 to {MOST} corners of three finite numbers each")
     points = flat.reshape(-1, 3)
     try:
