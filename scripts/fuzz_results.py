@@ -34,6 +34,7 @@ from casadi_hands.problem.si import build_model
 from casadi_hands.task import Task, load_task
 from casadi_hands.verify import audit_files
 from casadi_hands.verify.audit import audit
+from casadi_hands.verify.reading.folder import read_folder
 from casadi_hands.verify.replays.perturb import Perturbation
 from casadi_hands.verify.replays.replay import ENGINES, Player
 from casadi_hands.verify.replays.simulation import Plan, load_mujoco
@@ -112,6 +113,11 @@ def _export(folder: Path, task: Task) -> str:
     return "ok"
 
 
+def _read(folder: Path, task: Task) -> str:
+    read_folder(folder)
+    return "ok"
+
+
 Way = Callable[[Path, Task], str]
 WAYS: dict[str, Way] = {
     "audit": _audit,
@@ -121,6 +127,7 @@ WAYS: dict[str, Way] = {
     "replay": _replay,
     "export": _export,
     "drake": _drake,
+    "read": _read,
 }
 
 
@@ -224,7 +231,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="number of the first")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", type=int, help="number of the one to spoil")
-    parser.add_argument("--ways", default=",".join(way for way in WAYS if way != "drake"), help="to read them")
+    parser.add_argument("--ways", default="audit,load,view,from,replay,export", help=f"of {', '.join(WAYS)}")
     options = parser.parse_args()
     one = options.only is not None
     numbers = range(options.only, options.only + 1) if one else range(options.first, options.first + options.count)

@@ -116,7 +116,7 @@ def test_stages_are_those_of_the_pipeline() -> None:
         (["solve", "no.yaml"], "no.yaml: no such file"),
         (["solve", str(CAPSULE), "--executor", "here:1"], "executor: given 'here:1'; allowed: dask://HOST:PORT"),
         (["audit", "no-folder"], "no-folder: not a directory"),
-        (["view", "no-folder"], "no-folder: no viewer.html here"),
+        (["view", "no-folder"], "no-folder: there is no such folder"),
     ],
 )
 def test_bad_input_is_one_message_and_exit_2(
