@@ -170,7 +170,7 @@ HIDDEN: Cases = {
     "a second mass": (added(HAND, LINK + "/inertial", "<mass value='0.001'/>"), r"2 elements <mass>"),
     "a mesh": (
         edited(HAND, LINK + "/collision/geometry", lambda e, p: only(e, "<mesh filename='none.stl'/>")),
-        r"<mesh> would have a reader open other files",
+        r"mesh 'none\.stl' is no \.obj file within the folder",
     ),
     "a link that looks fat": (
         attribute(HAND, LINK + "/visual//sphere", "radius", "0.02"),
