@@ -50,7 +50,8 @@ def keep(key: str, arrays: Arrays) -> None:
     """Keep arrays under a name where that is possible; whoever reads meanwhile finds all or nothing."""
     with contextlib.suppress(OSError, RuntimeError):
         path, everything = _path(key), dict[str, Any](arrays, key=np.array(key))
-        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        for folder in (cache_folder(), path.parent):  # kernels are kept where nobody else can write
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(dir=path.parent)
         try:
             with os.fdopen(handle, "wb") as file:

@@ -1,4 +1,4 @@
-"""A few hundred of the mutants, of a small certified design: the same each time, and nothing of them goes wrong."""
+"""Sixty of the mutants, of a small certified design: the same each time, and nothing of them goes wrong."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_spoilt_folders_are_refused_or_read_and_nothing_else(good: Path) -> None:
-    outcomes = list(fuzz([good], range(120), seed=0, ways=["audit", "load", "view"]))
+    outcomes = list(fuzz([good], range(60), seed=0, ways=["audit", "load", "view"]))
     wrong = [
         (each.number, each.spoilt, reading)
         for each in outcomes
