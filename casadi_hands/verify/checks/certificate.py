@@ -24,8 +24,10 @@ def certificate_problems(directory: str | Path, figures: Mapping[str, Figure], l
         limits: whether the limits are those of the folder's own task.
     """
     stated = read_record(Path(directory) / "result.json").get("certificate")
-    if not isinstance(stated, dict):
+    if stated is None:
         return []
+    if not isinstance(stated, dict):
+        return ["certificate: that of result.json is no object of figures"]
     problems = []
     for name, figure in figures.items():
         value, limit = as_array(entry(stated, name, "value"), ()), as_array(entry(stated, name, "limit"), ())
