@@ -157,7 +157,7 @@ def fingertips_fit(task: Task) -> bool:
     _, position, vector = task.goal_poses()[0]
     tips = []
     for finger in task.fingers.values():
-        point = np.array(finger.touches)
+        point = np.array(finger.point)
         out = _touched(task.object, point).outward(point)
         tips.append(position + rotation_matrix(vector) @ (point + radius * out))
     apart = all(np.linalg.norm(a - b) >= 2 * radius for i, a in enumerate(tips) for b in tips[:i])

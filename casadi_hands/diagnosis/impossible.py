@@ -33,6 +33,9 @@ def findings(task: Task, model: Model) -> list[Finding]:
         task: as loaded.
         model: the same, nondimensional.
     """
+    if not task.is_placed:  # nothing is known of contacts
+        places = list(place_findings(task, model))
+        return [each for each in places if each.certain] or places
     places = [*place_findings(task, model), *fingertip_findings(task, model)]
     forces = [*_too_weak(task, model), *_weak_motors(task, model)]
     every = [*places, *grasp_findings(task, model), *forces]

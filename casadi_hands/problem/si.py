@@ -35,7 +35,7 @@ _SLIDING, _FAR, _PLANNED = 1e-3, 0.02, 0.8
 
 
 def build_model(task: Task) -> Model:
-    """Turn a task into nondimensional numbers."""
+    """Turn a task into nondimensional numbers; contacts that are not placed yet are left out."""
     gravity_size = float(np.linalg.norm(task.gravity))
     acceleration = gravity_size if gravity_size > 0 else STANDARD_GRAVITY
     length = task.object.characteristic_length
@@ -89,7 +89,7 @@ def build_model(task: Task) -> Model:
         clearance=round_off(task.hand.clearance / length),
         ratios=task.hand.ratios,
     )
-    return model if given else replace(model, force_limit=usual_force_limit(model))
+    return model if given or not task.is_placed else replace(model, force_limit=usual_force_limit(model))
 
 
 def _cosines(degrees: tuple[float, float]) -> tuple[float, float]:
@@ -104,10 +104,12 @@ def _sliding(slip: float, length: float) -> float:
 
 
 def _contacts(task: Task, bodies: Sequence[Body], length: float) -> tuple[Contact, ...]:
-    """The fingers' contacts, then the ground's."""
+    """The fingers' contacts that are placed, then the ground's."""
     found = []
     for name, finger in task.fingers.items():
-        patch = np.array(finger.touches) / length
+        if not finger.is_placed:
+            continue
+        patch = np.array(finger.point) / length
         found.append(Contact(name, round_off(patch), _nearest_body(patch, bodies), task.friction))
     if task.ground is not None:
         patch = np.asarray(task.ground.touches, float) / length

@@ -9,6 +9,7 @@ import numpy as np
 
 from casadi_hands.task.obstacles import depth_below, depth_in_palm, palm_depth_below
 from casadi_hands.task.problem import Problem
+from casadi_hands.task.region import Region
 from casadi_hands.task.task import Task
 from casadi_hands.task.units import wrong_units
 
@@ -16,6 +17,7 @@ from casadi_hands.task.units import wrong_units
 _LARGEST_TURN = 300.0
 # Depths below this share of the characteristic length are the rounding of numbers typed by hand.
 _TYPED = 1e-3
+_NAMELESS = "the name of one of object.shapes, and none has any: give it one, as in `sphere: {..., name: knob}`"
 
 
 def check(task: Task) -> list[Problem]:
@@ -115,11 +117,32 @@ def _contacts(task: Task) -> Iterator[Problem]:
         allowed = "two or more; a single contact cannot hold an object against gravity"
         yield Problem(("fingers",), "one finger", allowed)
     for number, name in enumerate(names):
+        if not task.fingers[name].is_placed:
+            yield from _region(task, name, task.fingers[name].touches)
+            continue
         for other in names[:number]:
-            apart = np.linalg.norm(np.subtract(task.fingers[name].touches, task.fingers[other].touches))
+            if not task.fingers[other].is_placed:
+                continue
+            apart = np.linalg.norm(np.subtract(task.fingers[name].point, task.fingers[other].point))
             if apart < _TYPED * task.object.characteristic_length:
                 allowed = f"a point away from that of {other}, since two fingertips cannot be in one place"
-                yield Problem(("fingers", name, "touches"), str(list(task.fingers[name].touches)), allowed)
+                yield Problem(("fingers", name, "touches"), str(list(task.fingers[name].point)), allowed)
+
+
+def _region(task: Task, name: str, region: Region) -> Iterator[Problem]:
+    """Of a contact that the program is to place."""
+    path = ("fingers", name, "touches")
+    known = [shape.name for shape in task.object.shapes if shape.name]
+    for field in ("on", "not_on"):
+        for each in getattr(region, field):
+            if each not in known:
+                names = f"the name of one of object.shapes: {', '.join(known)}" if known else _NAMELESS
+                yield Problem((*path, field), repr(each), names)
+    if region.near is not None and region.within is not None:
+        distance = min(abs(shape.body.signed_distance(np.array(region.near))) for shape in task.object.shapes)
+        if distance > region.within:
+            allowed = f"at least {distance:.3g} m, at which the object's surface is from {list(region.near)}"
+            yield Problem((*path, "within"), f"{region.within:g}", allowed)
 
 
 def _object_points(task: Task) -> Iterator[Problem]:

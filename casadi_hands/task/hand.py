@@ -6,8 +6,10 @@ from typing import Annotated, Any
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from casadi_hands.task.fields import NonNegative, Number, Pair, Positive, Section, Vector, follows, refuse
+from casadi_hands.errors import TaskError
+from casadi_hands.task.fields import Flag, NonNegative, Number, Pair, Positive, Section, Vector, follows, refuse
 from casadi_hands.task.material import DEFAULT_MATERIAL, MATERIALS, SAFETY, Material
+from casadi_hands.task.region import Asked, Place, Region
 from casadi_hands.task.servos import Drive
 
 USUAL_STIFFNESS = 1.0
@@ -38,9 +40,34 @@ def usual_hinge(radius: float, length: Any) -> float:
 class FingerSpec(Section):
     """A finger, known by its contact with the object."""
 
-    touches: Vector = Field(
-        description="Where the fingertip touches at the start, m, object frame; moved onto the nearest surface."
+    touches: Place = Field(
+        description="Where the fingertip touches at the start, m, object frame; moved onto the nearest surface. Or a "
+        "region in which the program places it: `{near: [x, y, z], within: distance}`, `{on: NAME}`, `{not_on: NAME}`, "
+        "several of these, or `anywhere`."
     )
+    optional: Flag | None = Field(
+        default=None, description="Whether the program, where it places the contact, may do without the finger."
+    )
+    placed: Asked | None = Field(
+        default=None, description="The region that was asked for, where the program placed the contact."
+    )
+
+    @property
+    def is_placed(self) -> bool:
+        """Whether there is a point to touch."""
+        return not isinstance(self.touches, Region)
+
+    @property
+    def point(self) -> Vector:
+        """The point to touch, m, object frame.
+
+        Raises:
+            TaskError: there is only a region.
+        """
+        if isinstance(self.touches, Region):
+            raise TaskError(f"the contact is not placed yet: it is to be {self.touches}; `solve` places it first")
+        x, y, z = self.touches
+        return x, y, z
 
 
 class Ground(Section):

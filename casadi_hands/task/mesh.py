@@ -54,6 +54,7 @@ class Mesh(Section):
         description="That of each part, as of `convex`.",
         json_schema_extra={"default": "that of `convex`"},
     )
+    name: str | None = Field(default=None, min_length=1, description="What regions of contacts call all of it.")
     _found: Decomposition = PrivateAttr()
     _solid: Uniform = PrivateAttr()
     _notes: tuple[str, ...] = PrivateAttr()

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from pydantic_core import ErrorDetails
 
 from casadi_hands.task.problem import Problem
+from casadi_hands.task.region import TAGS
 from casadi_hands.task.shapes import SECTIONS, spelled
 from casadi_hands.task.shown import shown
 from casadi_hands.task.structure import description_at, names_at, paths_of
@@ -37,12 +38,17 @@ _ALLOWED = {
 
 def explain(errors: Iterable[ErrorDetails]) -> list[Problem]:
     """Translate what pydantic found."""
-    errors = [error for error in errors if not _follows_from_another(error)]
+    errors = [_in_file(error) for error in errors if not _follows_from_another(error)]
     unknown = [_unknown(error["loc"]) for error in errors if error["type"] == "extra_forbidden"]
     meant = {(*problem.path[:-1], guess) for problem, guess in unknown if guess}
     # A misspelt field is reported once: as unknown, not as missing too.
     known = [error for error in errors if error["type"] != "extra_forbidden" and error["loc"] not in meant]
     return [problem for problem, _ in unknown] + [_known(error) for error in known]
+
+
+def _in_file(error: ErrorDetails) -> ErrorDetails:
+    """The error at the place where the file has it."""
+    return {**error, "loc": tuple(step for step in error["loc"] if step not in TAGS)}
 
 
 def _follows_from_another(error: ErrorDetails) -> bool:

@@ -30,7 +30,10 @@ def normalise(task: Task) -> tuple[Task, list[Problem]]:
     problems: list[Problem] = []
     fingers, ground = {}, task.ground
     for name, finger in task.fingers.items():
-        snapped = _snap(finger.touches, task.object, ("fingers", name, "touches"), problems)
+        if not finger.is_placed:
+            fingers[name] = finger
+            continue
+        snapped = _snap(finger.point, task.object, ("fingers", name, "touches"), problems)
         fingers[name] = finger.model_copy(update={"touches": snapped})
     problems += [] if problems else _together(task, {name: finger.touches for name, finger in fingers.items()})
     if ground:
@@ -99,7 +102,12 @@ def _recentre(task: Task) -> Task:
         update={
             "object": body.model_copy(update={"shapes": shapes, "center_of_mass": origin}),
             "fingers": {
-                name: finger.model_copy(update={"touches": shift(finger.touches)})
+                name: finger.model_copy(
+                    update={
+                        "touches": shift(finger.point) if finger.is_placed else finger.touches.shifted(-center),
+                        "placed": finger.placed and finger.placed.shifted(-center),
+                    }
+                )
                 for name, finger in task.fingers.items()
             },
             "ground": task.ground and task.ground.model_copy(update={"touches": shift(task.ground.touches)}),

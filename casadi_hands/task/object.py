@@ -109,6 +109,12 @@ class ManipulatedObject(Section):
         lower, upper = (np.array(corners) for corners in zip(*[s.bounding_box for s in self.shapes], strict=True))
         return lower.min(axis=0), upper.max(axis=0)
 
+    @property
+    def extremes(self) -> list[np.ndarray]:
+        """Points (3,) of the surface, m, object frame, that are farthest along its axes, either way, shape by shape."""
+        ways = [sign * axis for axis in np.eye(3) for sign in (1, -1)]
+        return [s.body.support(way)[0] + s.body.ball * way for s in self.shapes for way in ways]
+
     def lowest_point(self, rotation: np.ndarray) -> np.ndarray:
         """Point of the surface that is lowest with the object turned by ``rotation``.
 

@@ -31,13 +31,14 @@ MOST_POINTS = 500
 class Primitive(Section):
     """A primitive of the object; its class names the shape."""
 
+    name: str | None = Field(default=None, min_length=1, description="What regions of contacts call it.")
     _part_of: tuple[Mesh, int] | None = PrivateAttr(None)
 
     @cached_property
     def body(self) -> Body:
         """The body, m, object frame."""
         kind = KINDS[type(self).__name__.lower()]
-        return kind(**{name: _value(getattr(self, name)) for name in type(self).model_fields})
+        return kind(**{name: _value(getattr(self, name)) for name in type(self).model_fields if name != "name"})
 
     @property
     def uniform(self) -> tuple[Uniform, ...]:
@@ -74,7 +75,7 @@ class Primitive(Section):
 
     @model_serializer(mode="wrap")
     def _tagged(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return {type(self).__name__.lower(): handler(self)}
+        return {type(self).__name__.lower(): {n: v for n, v in handler(self).items() if (n, v) != ("name", None)}}
 
     def moved(self, by: np.ndarray) -> Primitive:
         """The same primitive shifted by ``by`` (3,), m."""
@@ -160,7 +161,9 @@ def parts_of(mesh: Mesh) -> tuple[Primitive, ...]:
         ValidationError: one of them cannot have the edge radius.
     """
     edge = {} if mesh.edge_radius is None else {"edge_radius": mesh.edge_radius}
-    parts = tuple(SECTIONS["convex"](vertices=[vector(v) for v in part], **edge) for part in mesh.vertices)
+    parts = tuple(
+        SECTIONS["convex"](vertices=[vector(v) for v in part], **edge, name=mesh.name) for part in mesh.vertices
+    )
     for number, part in enumerate(parts):
         part._part_of = (mesh, number)
     return parts

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator
+from numpy.typing import ArrayLike
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
 
 from casadi_hands.motion import nearest_exponential
 from casadi_hands.task.fields import Positive, Section, Vector, Whole, fill, follows, refuse
@@ -24,6 +26,7 @@ from casadi_hands.task.material import hinge_loads
 from casadi_hands.task.motion import Goal, Perturbation
 from casadi_hands.task.object import ManipulatedObject
 from casadi_hands.task.palm import Palm
+from casadi_hands.task.region import counted_fingers
 from casadi_hands.task.search import Search
 from casadi_hands.task.servos import servo_reach
 from casadi_hands.task.weights import Weights
@@ -58,7 +61,11 @@ class Task(Section):
     keyframes_between: Annotated[Whole, Field(ge=1, le=3)] = Field(
         default=2, description="Keyframes between one goal and the next, 1 to 3."
     )
-    fingers: dict[str, FingerSpec] = Field(min_length=1, description="The fingers by name, one contact each.")
+    fingers: Annotated[dict[str, FingerSpec], BeforeValidator(counted_fingers)] = Field(
+        min_length=1,
+        description="The fingers by name, one contact each. Or, for contacts that the program places, their number, "
+        "`{count: [least, most]}`, or `auto`: 2 to 5.",
+    )
     friction: Positive = Field(default=0.5, description="Coulomb friction of fingertips and object.")
     gravity: Vector = Field(default=(0.0, 0.0, -STANDARD_GRAVITY), description="Gravity, m/s², world.")
     ground: Ground | None = Field(
@@ -117,7 +124,10 @@ class Task(Section):
             return fill(value, hinge_length=usual_hinge(radius, value["link_length"]) if plain else 0.0)
         length = (1.0, 1.0)
         if palm and fingers and goals and plain:
-            reach = palm.radius + _farthest_contact(palm, fingers, goals, info.data.get("tool"))
+            touched = [finger.point for finger in fingers.values() if finger.is_placed]
+            if len(touched) < len(fingers) and body:
+                touched = [*touched, *body.extremes]
+            reach = palm.radius + _farthest_contact(palm, touched, goals, info.data.get("tool"))
             shortest = max(SHORTEST_LINK * radius, 2.0 * servo_reach(value.get("drive")))
             length = (shortest, max(shortest, reach))
         return fill({**value, "link_length": length}, hinge_length=usual_hinge(radius, length) if plain else 0.0)
@@ -167,6 +177,11 @@ class Task(Section):
         return self.tool is not None
 
     @property
+    def is_placed(self) -> bool:
+        """Whether every finger has a point to touch; else `solve` places contacts first."""
+        return all(finger.is_placed for finger in self.fingers.values())
+
+    @property
     def force_unit(self) -> float:
         """The object's weight, N; with gravity off, what it would be at 9.81 m/s²."""
         return self.object.mass * (float(np.linalg.norm(self.gravity)) or STANDARD_GRAVITY)
@@ -204,12 +219,10 @@ def _poses(goals: tuple[Goal, ...], tool: Vector | None) -> tuple[tuple[float, n
     return tuple((goal.at, position(goal), goal.rotation.vector) for goal in goals)
 
 
-def _farthest_contact(
-    palm: Palm, fingers: dict[str, FingerSpec], goals: tuple[Goal, ...], tool: Vector | None
-) -> float:
-    """Largest distance over goals and fingers of a contact and the nearest place the palm passes through, m."""
+def _farthest_contact(palm: Palm, touched: Sequence[ArrayLike], goals: tuple[Goal, ...], tool: Vector | None) -> float:
+    """Largest distance over goals and points (object frame) of one and the nearest place the palm passes through, m."""
     centers = np.array([position for _, position, _ in palm.waypoints])
-    contacts = np.array([finger.touches for finger in fingers.values()])
+    contacts = np.array(touched)
     farthest = 0.0
     for goal, (_, position, _) in zip(goals, _poses(goals, tool), strict=True):
         world = position + contacts @ goal.rotation.matrix.T

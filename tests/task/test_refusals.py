@@ -179,7 +179,7 @@ SPOILT = {
     "field of a shape": (
         "radius: 0.02",
         "radius: 0.02, length: 1",
-        "5: object.shapes[0].capsule.length: given an unknown field; allowed: start, end, radius",
+        "5: object.shapes[0].capsule.length: given an unknown field; allowed: name, start, end, radius",
     ),
     "centre of mass outside": (
         "mass: 0.1",
@@ -232,7 +232,7 @@ SPOILT = {
     "no fingers": (
         FINGERS,
         "fingers: {}\n",
-        "14: fingers: given 0 of them; allowed: at least 1: The fingers by name, one contact each.",
+        "14: fingers: given 0 of them; allowed: at least 1: The fingers by name, one contact each...",
     ),
     "one finger against gravity": (
         "  index: {touches: [0, -0.02, 0.02]}\n",
