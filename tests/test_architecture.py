@@ -19,7 +19,7 @@ FLOORS = (
     {"nlp", "kinematics", "terms", "statics", "execution", "meshes"},
     {"task"},
     {"problem"},
-    {"stages", "verify"},
+    {"stages", "verify", "placement"},
     {"export", "diagnosis"},
     {"pipeline"},
     {"__init__", "cli"},  # and scripts
