@@ -32,6 +32,8 @@ def design_summary(design: Design, folder: Path) -> RenderableType:
         parts.append(Text(f"replays: {design.replay_words}"))
     if design.reason:
         parts.append(Text(f"{'why' if design.status == 'failed' else 'note'}: {design.reason}"))
+    if design.placement and design.status != "failed":
+        parts.append(Text(f"contacts placed: {design.placement['why']}"))
     if design.hand is not None:
         fingers = ", ".join(f"{finger.name} {len(finger.links)}" for finger in design.hand.fingers)
         parts.append(Text(f"joints: {fingers}; {design.hand.degrees_of_freedom} in all"))

@@ -11,8 +11,9 @@ from rich.table import Table
 from rich.text import Text
 
 from casadi_hands.diagnosis.impossible import findings
+from casadi_hands.placement.place import Proposal, propose
 from casadi_hands.problem.si import build_model
-from casadi_hands.task import Goal, Task
+from casadi_hands.task import FingerSpec, Goal, Task
 
 
 def check_summary(task: Task, questions: Sequence[str] = ()) -> tuple[RenderableType, bool]:
@@ -25,6 +26,9 @@ def check_summary(task: Task, questions: Sequence[str] = ()) -> tuple[Renderable
     Returns:
         That, and whether some hand might do the task.
     """
+    proposal = None if task.is_placed else propose(task)
+    if proposal is not None and proposal.sets:
+        task = proposal.sets[0].in_task(task)
     model = build_model(task)
     table = Table.grid(padding=(0, 2))
     for name, text in _lines(task, model.force_limit):
@@ -33,7 +37,34 @@ def check_summary(task: Task, questions: Sequence[str] = ()) -> tuple[Renderable
     found = findings(task, model)
     told = [Text(f"is this meant? {question}") for question in questions]
     told += [Text(f"{'no hand can do this' if each.certain else 'may fail'}: {each.reason.text}") for each in found]
-    return Group(title, table, *told), not any(each.certain for each in found)
+    placed, possible = [], not any(each.certain for each in found)
+    if proposal is not None:
+        placed = placement_summary(proposal)
+        possible &= bool(proposal.sets)
+        told += [] if proposal.sets else [Text(f"no hand can do this: {proposal.reason}")]
+    return Group(title, table, *placed, *told), possible
+
+
+def placement_summary(proposal: Proposal) -> list[RenderableType]:
+    """The sets of contacts that the program found, best first."""
+    if not proposal.sets:
+        return []
+    table = Table(box=None, padding=(0, 2), pad_edge=False)
+    for name in ("set", "grip", "reach", "stiffness", "off side-on", "contacts, mm"):
+        table.add_column(name, overflow="fold")
+    for number, each in enumerate(proposal.sets, start=1):
+        points = ", ".join(f"{name} {_numbers([1e3 * x for x in point])}" for name, point in each.points.items())
+        figures = [f"{each.grip:.2f}", f"{each.reach:.2f}", f"{each.wobble:.2f}", f"{each.worst_angle:.0f}°"]
+        table.add_row(str(number), *figures, points)
+    words = (
+        f"contacts are placed among {proposal.candidates} points that fingers can touch, of {proposal.drawn} spread "
+        f"over the object. Grip: weights that the hardest-pressed contact presses with at least, at 70 % of the "
+        f"friction, so that springs in place of motors withstand {proposal.sets[0].withstands}. Reach: what being off "
+        f"side-on to the palm, far from it, travelling far and on a curved surface costs. Stiffness: that the grasp "
+        f"asks for so as not to turn over, by what joints have. Set 1 has the least of all together and is shown "
+        f"above; `solve` tries fingers on each, and takes what needs the fewest joints"
+    )
+    return [Text(), Text(words), table]
 
 
 def _lines(task: Task, force_limit: float) -> Iterator[tuple[str, str]]:
@@ -43,7 +74,7 @@ def _lines(task: Task, force_limit: float) -> Iterator[tuple[str, str]]:
     yield "", f"inertia, principal: {_numbers(np.linalg.eigvalsh(np.array(task.object.inertia)))} kg·m²"
     yield "palm", _palm(task)
     for i, (name, finger) in enumerate(task.fingers.items()):
-        yield "" if i else "fingers", f"{name} touches the object at {_mm(finger.touches)}"
+        yield "" if i else "fingers", f"{name} {_touches(finger)}"
     most = f"{force_limit:g} weights ({force_limit * task.force_unit:.3g} N)"
     yield "", f"contact forces of at most {most} along each axis of the object"
     yield "links", _links(task)
@@ -70,6 +101,13 @@ def _lines(task: Task, force_limit: float) -> Iterator[tuple[str, str]]:
             "limits",
             "changed from their defaults: " + ", ".join(f"{name} {value:g}" for name, value in changed.items()),
         )
+
+
+def _touches(finger: FingerSpec) -> str:
+    where = (
+        f"touches the object at {_mm(finger.point)}" if finger.is_placed else f"may touch the object {finger.touches}"
+    )
+    return where if finger.placed is None else f"{where}, placed by the program: {finger.placed}"
 
 
 def _object(task: Task) -> str:

@@ -16,6 +16,7 @@ from casadi_hands.export.record import STATUSES, design_record, hand_from_record
 from casadi_hands.export.table import motion_table
 from casadi_hands.export.urdf import hand_urdf, object_urdf
 from casadi_hands.problem.result import Result
+from casadi_hands.problem.stored import read_json
 from casadi_hands.task import load_task, task_to_yaml
 
 _FILES = (
@@ -25,6 +26,7 @@ _FILES = (
     "scene.xml",
     "motion.npz",
     "motion.csv",
+    "placement.json",
     "result.json",
     "viewer.html",
 )
@@ -63,6 +65,8 @@ def _write(design: Result, directory: Path, page: bool) -> None:
             if motion.joint_commands is None:
                 motion = commanded(design.task, design.hand, motion)
             texts["scene.xml"] = scene_mjcf(design.task, design.hand, motion)
+    if design.placement:
+        texts["placement.json"] = record_text(design.placement)
     meshes = mesh_files(design.task)
     if meshes:
         (directory / FOLDER).mkdir(exist_ok=True)
@@ -138,4 +142,16 @@ def read_design(directory: Path) -> dict[str, Any]:
         replays=record.get("replays", []),  # earlier versions told of none
         stages=record["stages"],
         seconds=record["seconds"],
+        placement=_read_placement(directory),
     )
+
+
+def _read_placement(directory: Path) -> dict[str, Any]:
+    """What the folder tells of contacts that the program placed, if it did."""
+    path = directory / "placement.json"
+    if not path.exists():
+        return {}
+    found = read_json(path)
+    if not isinstance(found, dict):
+        raise DesignError(f"{path}: is not what is told of contacts: no entries by their names")
+    return found

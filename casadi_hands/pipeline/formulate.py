@@ -22,6 +22,7 @@ from casadi_hands.nlp.program_folder import save_program
 from casadi_hands.nlp.solver import Solve, keep_solves
 from casadi_hands.pipeline.certify import refinable
 from casadi_hands.pipeline.margins import margins_for
+from casadi_hands.pipeline.placing import place
 from casadi_hands.pipeline.record import STAGES, Progress, Record
 from casadi_hands.pipeline.steps import prepare_search, run_floating, run_search, run_whole_hand
 from casadi_hands.problem.hand_motion import WholeHand
@@ -148,6 +149,12 @@ def formulate(
     with processes(jobs) if executor is None else nullcontext(executor) as workers:
         if workers is not None and stage != STAGES[0]:
             start_up(workers, jobs)
+        if not task.is_placed:
+            tasks, told = place(task, record, workers)
+            if not tasks:
+                raise SolveError(told["why"])
+            task = tasks[0]
+            record = record.placed(task, told, written=False)
         try:
             model, step, solve = _posed(record, stage, workers)
         except SolverError as error:

@@ -25,7 +25,7 @@ class Progress:
     """What a solve is doing.
 
     Attributes:
-        stage: one of ``STAGES``, or ``check`` for what the task alone shows.
+        stage: ``check`` for what the task alone shows, ``placement``, or one of ``STAGES``.
         text: what is tried, and the best so far.
         elapsed: s since the solve began.
     """
@@ -81,6 +81,19 @@ class Record:
         self.design = Design(task=task, status="failed", reason="nothing has been computed yet")
         self._best: tuple[tuple[float, ...], Design] | None = None
         self._unmet: dict[str, tuple[Reason, ...]] = {}
+
+    def placed(self, task: Task, placement: dict[str, Any], written: bool) -> Record:
+        """A record of the same task with its contacts placed, whose time has begun with this one.
+
+        Args:
+            task: with its contacts in place.
+            placement: what is told of that.
+            written: whether designs are written as they grow.
+        """
+        record = Record(task, self.out if written else None, self.report, self.own_terms)
+        record.started = self.started
+        record.update(task=task, placement=placement, seconds=dict(self.design.seconds))
+        return record
 
     def log(self, stage: str, text: str) -> None:
         """Report progress."""

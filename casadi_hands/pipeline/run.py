@@ -16,11 +16,13 @@ from casadi_hands.diagnosis.shortcoming import shortcoming_reason
 from casadi_hands.errors import SolveError
 from casadi_hands.execution.processes import processes, start_up
 from casadi_hands.export.design import Design
+from casadi_hands.export.record import STATUSES
 from casadi_hands.nlp import SolverError
 from casadi_hands.pipeline.certify import Certifier
 from casadi_hands.pipeline.couplings import Coupler
 from casadi_hands.pipeline.judge import Judge, counted
-from casadi_hands.pipeline.record import STAGES, Progress, Record
+from casadi_hands.pipeline.placing import ATTEMPTS, place, placed_like, unplaceable
+from casadi_hands.pipeline.record import STAGES, Progress, Record, rank_of
 from casadi_hands.pipeline.refiner import Refiner
 from casadi_hands.pipeline.steps import adopt, prepare_search, run_floating, run_search, run_whole_hand
 from casadi_hands.pipeline.warm_start import as_floating, kept_margin, warm_start
@@ -80,29 +82,79 @@ def solve(
     if seed is not None:
         task = task.model_copy(update={"search": task.search.model_copy(update={"seed": seed})})
     own_terms = checked(terms)
-    model = replace(build_model(task), own_terms=own_terms)
-    try_out(model, task.search.max_joints)
+    if start is not None and not task.is_placed:
+        task = placed_like(task, Design.load(start).task)
+        if not task.is_placed:
+            raise SolveError(
+                f"{start}: the earlier result has no contacts that were placed for what this task asks of its fingers; "
+                "solving without --from works"
+            )
+    if task.is_placed:
+        try_out(replace(build_model(task), own_terms=own_terms), task.search.max_joints)
     if until in STAGES[2:]:
         load_mujoco()  # before hours of work, not after them
     jobs = jobs or os.cpu_count() or 1
     record = Record(task, out, progress or (lambda _: None), own_terms)
-    seen = findings(task, model)
+    seen = findings(task, build_model(task))
     if never := [each.reason for each in seen if each.certain]:
         return record.keep(replace(record.design, reason=format_reasons(never)))
     doubts = format_reasons(each.reason for each in seen)
     if doubts:
         record.log("check", doubts)
     with processes(jobs) if executor is None else nullcontext(executor) as workers:
-        try:
-            design = None if start is None else _refine_again(record, start)
-            design = design or _run(record, until, workers, jobs)
-        except SolverError as error:
-            _LOG.debug("the solve broke off", exc_info=True)
-            design = record.broken_off(error)
-        design = counted(design)
-        if doubts and until == STAGES[-1] and design.status != "certified":
-            design = replace(design, reason=f"{design.reason}. The task alone says that {doubts}")
-        return record.keep(design)
+        if not task.is_placed:
+            return _design_placed(record, until, workers, jobs)
+        return record.keep(_doubted(_design(record, until, workers, jobs, start), doubts, until))
+
+
+def _doubted(design: Design, doubts: str, until: str) -> Design:
+    """The design; where it is not certified, with what the task alone says against it."""
+    if not doubts or until != STAGES[-1] or design.status == "certified":
+        return design
+    return replace(design, reason=f"{design.reason}. The task alone says that {doubts}")
+
+
+def _design(record: Record, until: str, workers: Executor | None, jobs: int, start: Path | None = None) -> Design:
+    """The design of a task whose contacts have their places."""
+    try:
+        design = None if start is None else _refine_again(record, start)
+        return counted(design or _run(record, until, workers, jobs))
+    except SolverError as error:
+        _LOG.debug("the solve broke off", exc_info=True)
+        return counted(record.broken_off(error))
+
+
+def _design_placed(record: Record, until: str, workers: Executor | None, jobs: int) -> Design:
+    """Place contacts, then design; where that gives no certified hand, with the next best contacts, too."""
+    if workers is not None:
+        start_up(workers, jobs)
+    tasks, told = place(record.task, record, workers)
+    if not tasks:
+        return record.keep(unplaceable(record, told))
+    best: Design | None = None
+    for number, task in enumerate(tasks[: ATTEMPTS if until == STAGES[-1] else 1]):
+        model = replace(build_model(task), own_terms=record.own_terms)
+        try_out(model, task.search.max_joints)
+        # The first is written as it grows; what a second leaves half done shall not replace it.
+        own = record.placed(task, {**told, "chosen": number}, written=number == 0)
+        seen = findings(task, model)
+        if never := [each.reason for each in seen if each.certain]:
+            design = replace(own.design, reason=format_reasons(never))
+        else:
+            design = _doubted(_design(own, until, workers, jobs), format_reasons(each.reason for each in seen), until)
+        design = own.complete(design)
+        best = design if best is None else min(best, design, key=_rank)
+        if best.status == "certified":
+            break
+    assert best is not None
+    if record.out is not None:
+        best.save(record.out)
+    return best
+
+
+def _rank(design: Design) -> tuple[float, ...]:
+    """Best first."""
+    return STATUSES.index(design.status), *rank_of(design)
 
 
 def _refine_again(record: Record, start: Path) -> Design | None:

@@ -28,6 +28,7 @@ class Result:
         replays: one entry for each physics engine that played the design; see ``docs/result-folder.md``.
         stages: one entry for each solver run.
         seconds: wall time by stage, and ``total``.
+        placement: where the program placed contacts, the sets it chose from and why; empty where all were given.
     """
 
     task: Task
@@ -40,6 +41,7 @@ class Result:
     replays: list[dict[str, Any]] = field(default_factory=list)
     stages: list[dict[str, Any]] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=dict)
+    placement: dict[str, Any] = field(default_factory=dict)
 
     @property
     def missed(self) -> set[str]:

@@ -461,3 +461,29 @@ def test_view_opens_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(webbrowser, "open", lambda address: opened.append(address) or True)
     assert run("view", tmp_path).exit_code == 0
     assert opened == [(tmp_path / "viewer.html").resolve().as_uri()]
+
+
+def test_check_shows_the_contacts_that_it_finds(tmp_path: Path) -> None:
+    path = tmp_path / "ball.yaml"
+    path.write_text(
+        """
+object: {mass: 0.1, shapes: [{sphere: {center: [0, 0, 0], radius: 0.03}}]}
+palm: {position: [0, 0, 0.3], facing: [0, 0, -1]}
+motion: [{at: 0, position: [0, 0, 0.22]}, {at: 2, position: [0, 0, 0.2]}]
+fingers: 3
+"""
+    )
+    found = run("check", path)
+    text = " ".join(found.output.split())
+    assert found.exit_code == 0
+    assert text.count(" touches the object at [") == text.count("placed by the program: anywhere") == 3
+    assert "so that springs in place of motors withstand pushes of half the weight and torques along any axis" in text
+    assert "set grip reach stiffness off side-on contacts, mm 1 " in text
+    path.write_text(
+        path.read_text().replace(
+            "fingers: 3", "fingers: {a: {touches: {near: [0, 0, -0.03], within: 0.001}}, b: {touches: anywhere}}"
+        )
+    )
+    found = run("check", path)
+    assert found.exit_code == 1
+    assert "no hand can do this: contact 'a' (within 1 mm of [0.0, 0.0, -0.03] m)" in " ".join(found.output.split())

@@ -1,0 +1,159 @@
+"""Contacts that the program places: the best sets by statics, the soft stages over each at small cost, best first."""
+
+from __future__ import annotations
+
+from concurrent.futures import Executor
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+from casadi_hands.execution.processes import run_all
+from casadi_hands.export.design import Design
+from casadi_hands.nlp import SolverError
+from casadi_hands.pipeline.record import Record
+from casadi_hands.placement.place import ContactSet, Proposal, propose
+from casadi_hands.problem.si import build_model
+from casadi_hands.stages.floating.stage import solve_floating
+from casadi_hands.stages.synthesis.algorithm import Search
+from casadi_hands.stages.synthesis.score import singular_fingers
+from casadi_hands.stages.synthesis.target import target_of
+from casadi_hands.task import Task
+
+TRIALS, RECOMBINATIONS = 3, 2  # of the search, where the task's are more
+ATTEMPTS = 2  # sets that are solved in full, the second where the first gives no certified hand
+
+
+@dataclass(frozen=True)
+class Tried:
+    """What the soft stages made of a set of contacts.
+
+    Attributes:
+        joints: of each finger.
+        lacking: fingers that would need more joints than are allowed.
+        singular: fingers that pass a singular pose while they touch.
+        idle: contacts that never act, and have no finger.
+        held: whether contacts that let go at times, as the motion has it, can hold the object.
+        broke_off: why there is nothing to tell, else empty.
+    """
+
+    joints: tuple[int, ...] = ()
+    lacking: int = 0
+    singular: int = 0
+    idle: int = 0
+    held: bool = False
+    broke_off: str = ""
+
+    def rank(self, contacts: ContactSet) -> tuple[float, ...]:
+        """Best first: what can be done, with all fingers, few joints, no singular poses, and little grip in reach."""
+        done = bool(self.broke_off), self.lacking, not self.held, self.idle
+        return (*done, sum(self.joints), self.singular, contacts.cost)
+
+
+def place(task: Task, record: Record, executor: Executor | None) -> tuple[list[Task], dict[str, Any]]:
+    """Place the contacts of a task.
+
+    Args:
+        task: some of whose contacts have no place.
+        record: told of the progress.
+        executor: where the soft stages run; what is placed does not depend on it.
+
+    Returns:
+        The task with contacts in place, best set first, none where there is none; and what is to be told of it.
+    """
+    with record.stage("placement", f"contacts for {len(task.fingers)} fingers, by statics"):
+        proposal = propose(task)
+        tasks = [each.in_task(task) for each in proposal.sets]
+        done = 0
+
+        def tell(index: int, tried: Tried) -> None:
+            nonlocal done
+            done += 1
+            record.log("placement", f"set {index + 1}, {done} of {len(tasks)}: {_tried_words(tried)}")
+
+        tried = (
+            run_all(executor, try_contacts, [(each,) for each in tasks], tell)
+            if len(tasks) > 1
+            else [Tried()] * len(tasks)
+        )
+    order = sorted(range(len(tasks)), key=lambda k: (*tried[k].rank(proposal.sets[k]), k))
+    return [tasks[k] for k in order], _told(task, proposal, tried, order)
+
+
+def try_contacts(task: Task) -> Tried:
+    """Stages 1 and 2 over a task with few trials."""
+    model, search = build_model(task), task.search
+    try:
+        floating = solve_floating(model, dict(task.weights.floating))
+        algorithm = Search(
+            target_of(floating.model, floating),
+            dict(task.weights.synthesis),
+            trials=min(TRIALS, search.trials),
+            recombinations=min(RECOMBINATIONS, search.recombinations),
+            max_joints=search.max_joints,
+            threshold=search.threshold,
+            seed=search.seed,
+            executor=None,
+            progress=lambda _: None,
+        )
+        found = algorithm.run()
+    except SolverError as error:
+        return Tried(broke_off=str(error))
+    best = found.candidates[0]
+    singular = singular_fingers(algorithm.target, best.hand)
+    idle = len(task.fingers) - len(best.joints)
+    return Tried(best.joints, len(found.short), singular, idle, floating.threshold > 0)
+
+
+def placed_like(task: Task, earlier: Task) -> Task:
+    """The task with the contacts of an earlier one, where the program placed them for the same regions.
+
+    What it did not place stays without a place.
+    """
+    fingers = {}
+    for name, finger in task.fingers.items():
+        other = earlier.fingers.get(name)
+        known = other is not None and not finger.is_placed and other.placed == finger.touches
+        fingers[name] = other if known and other is not None else finger
+    kept = {n: f for n, f in fingers.items() if f.is_placed or not f.optional}
+    return task.model_copy(update={"fingers": kept}) if all(f.is_placed for f in kept.values()) else task
+
+
+def unplaceable(record: Record, told: dict[str, Any]) -> Design:
+    """The failed design of a task whose contacts cannot be placed."""
+    return replace(record.design, status="failed", reason=told["why"], placement=told)
+
+
+def _told(task: Task, proposal: Proposal, tried: list[Tried], order: list[int]) -> dict[str, Any]:
+    """What ``placement.json`` holds."""
+    sets = []
+    for k in order:
+        each = proposal.sets[k]
+        stages = {**asdict(tried[k]), "joints": list(tried[k].joints)}
+        sets.append({**asdict(each), "points": {n: list(p) for n, p in each.points.items()}, **stages})
+    return {
+        "asked": {name: str(f.touches) for name, f in task.fingers.items() if not f.is_placed},
+        "points_on_surface": proposal.drawn,
+        "points_within_reach": proposal.candidates,
+        "sets": sets,
+        "why": why([proposal.sets[k] for k in order], [tried[k] for k in order]) if order else proposal.reason,
+    }
+
+
+def why(sets: list[ContactSet], tried: list[Tried]) -> str:
+    """Why the first set was chosen, in a sentence."""
+    first, best = sets[0], tried[0]
+    grip = (
+        f"its hardest-pressed contact presses with {first.grip:.2g} weights at least, to withstand {first.withstands}"
+    )
+    if len(sets) == 1 or not best.joints:
+        return f"the one set found: {grip}"
+    others = ", ".join(_tried_words(each) for each in tried[1:])
+    return f"of {len(sets)} sets it takes the least: {_tried_words(best)} (the others: {others}); {grip}"
+
+
+def _tried_words(tried: Tried) -> str:
+    if tried.broke_off:
+        return "broke off"
+    words = f"{'+'.join(map(str, tried.joints))} joints"
+    words += f", {tried.lacking} of the fingers would need more" if tried.lacking else ""
+    words += f", {tried.idle} idle" if tried.idle else ""
+    return words + (f", {tried.singular} in singular poses" if tried.singular else "")

@@ -1,0 +1,135 @@
+"""Contacts placed on the way to a design: sets tried, the best first, written and told; the same however it is run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from casadi_hands.errors import SolveError
+from casadi_hands.execution.processes import processes
+from casadi_hands.export.design import Design
+from casadi_hands.pipeline import placing, run, solve
+from casadi_hands.pipeline.formulate import formulate
+from casadi_hands.pipeline.placing import Tried, place, placed_like
+from casadi_hands.pipeline.record import Record
+from casadi_hands.placement.place import propose
+from casadi_hands.task import Task, parse_task
+
+TASK = """\
+name: ball
+object: {mass: 0.1, shapes: [{sphere: {center: [0, 0, 0], radius: 0.03}}]}
+palm: {position: [0, 0, 0.3], facing: [0, 0, -1]}
+motion: [{at: 0, position: [0, 0, 0.22]}, {at: 2, position: [0, 0, 0.2]}]
+friction: 0.8
+search: {trials: 1, recombinations: 1, max_joints: 1}
+fingers: FINGERS
+"""
+
+
+def ball(fingers: str = "3") -> Task:
+    return parse_task(TASK.replace("FINGERS", fingers))
+
+
+def silent(task: Task) -> Record:
+    return Record(task, None, lambda _: None)
+
+
+def tried_as(monkeypatch: pytest.MonkeyPatch, *outcomes: Tried) -> None:
+    """Let the soft stages end so for the sets in turn."""
+    left = list(outcomes)
+    monkeypatch.setattr(placing, "try_contacts", lambda _: left.pop(0))
+
+
+def test_fewest_joints_come_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    count = len(propose(ball()).sets)
+    assert count >= 3
+    outcomes = [Tried((2, 2, 2), held=True), Tried((1, 1), idle=1, held=True), Tried((2, 1, 2), held=True)]
+    outcomes += [Tried(broke_off="no")] * (count - 3)
+    tried_as(monkeypatch, *outcomes)
+    tasks, told = place(ball(), silent(ball()), None)
+    sets = propose(ball()).sets
+    assert [t.fingers for t in tasks[:3]] == [sets[k].in_task(ball()).fingers for k in (2, 0, 1)]
+    assert told["sets"][0]["joints"] == [2, 1, 2]
+    assert told["why"].startswith(
+        f"of {count} sets it takes the least: 2+1+2 joints (the others: 2+2+2 joints, 1+1 joints, 1 idle"
+    )
+    assert told["asked"] == dict.fromkeys(("finger1", "finger2", "finger3"), "anywhere")
+
+
+def test_the_same_in_other_processes() -> None:
+    here = place(ball(), silent(ball()), None)
+    with processes(2) as workers:
+        there = place(ball(), silent(ball()), workers)
+    assert here == there
+
+
+def solved_as(monkeypatch: pytest.MonkeyPatch, *statuses: str) -> list[Task]:
+    """Let designs end so, in turn; the tasks they are of."""
+    left, tasks = list(statuses), []
+
+    def design(record: Record, *_: Any) -> Design:
+        tasks.append(record.task)
+        return replace(record.design, status=left.pop(0), reason="")
+
+    monkeypatch.setattr(run, "_design", design)
+    monkeypatch.setattr(placing, "try_contacts", lambda _: Tried((1, 1, 1), held=True))
+    return tasks
+
+
+def test_the_placed_contacts_are_written(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    tasks = solved_as(monkeypatch, "certified")
+    design = solve(ball(), jobs=1, out=tmp_path)
+    again = Design.load(tmp_path)
+    assert again.task.fingers == design.task.fingers == tasks[0].fingers
+    assert again.task.is_placed
+    assert again.placement == design.placement
+    assert again.placement["chosen"] == 0
+    assert again.seconds["placement"] > 0
+    first = again.placement["sets"][0]["points"]
+    assert {name: list(finger.point) for name, finger in again.task.fingers.items()} == first
+
+
+@pytest.mark.parametrize(("statuses", "chosen"), [(("feasible", "certified"), 1), (("feasible", "failed"), 0)])
+def test_the_next_set_where_the_first_is_not_certified(
+    statuses: tuple[str, str], chosen: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    tasks = solved_as(monkeypatch, *statuses)
+    design = solve(ball(), jobs=1, out=tmp_path)
+    assert len(tasks) == 2
+    assert design.task.fingers == tasks[chosen].fingers
+    assert Design.load(tmp_path).placement["chosen"] == chosen
+
+
+def test_what_cannot_be_placed_fails_with_its_reason(tmp_path: Path) -> None:
+    # On the side that faces away from the palm no finger is side-on.
+    task = ball("{a: {touches: {near: [0, 0, -0.03], within: 0.001}}, b: {touches: anywhere}}")
+    design = solve(task, jobs=1, out=tmp_path)
+    assert design.status == "failed"
+    assert design.reason.startswith("contact 'a' (within 1 mm of [0.0, 0.0, -0.03] m): ")
+    assert Design.load(tmp_path).reason == design.reason
+    with pytest.raises(SolveError, match="contact 'a'"):
+        formulate(task, "floating", jobs=1)
+
+
+def test_a_program_of_placed_contacts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(placing, "try_contacts", lambda _: Tried((1, 1, 1), held=True))
+    found = formulate(ball(), "floating", jobs=1)
+    assert found.model.contact_names == ("finger1", "finger2", "finger3")
+
+
+def test_contacts_of_an_earlier_result_are_kept() -> None:
+    task = ball("{count: [2, 4]}")
+    earlier = propose(task).sets[0].in_task(task)
+    again = placed_like(task, earlier)
+    assert again.is_placed
+    assert again.fingers == earlier.fingers
+    assert placed_like(ball("{a: {touches: anywhere}, b: {touches: anywhere}}"), earlier).is_placed is False
+
+
+def test_an_earlier_result_of_other_contacts_is_no_start(tmp_path: Path) -> None:
+    Design(task=ball("{a: {touches: [0, 0.03, 0]}, b: {touches: [0, -0.03, 0]}}"), status="failed").save(tmp_path)
+    with pytest.raises(SolveError, match="has no contacts that were placed for what this task asks"):
+        solve(ball(), jobs=1, start=tmp_path)
