@@ -139,7 +139,7 @@ REFUSED = {
     "unknown field": (
         "scale",
         "scales",
-        "5: object.shapes[0].mesh.scales: given an unknown field; allowed: file, scale, parts, edge_radius; ...",
+        "5: object.shapes[0].mesh.scales: given an unknown field; allowed: file, scale, parts, edge_radius, name; ...",
     ),
     "no parts": (
         "scale: 0.001",
