@@ -67,6 +67,8 @@ RANGES = {
     "end": _PLACE,
     "position": _PLACE,
     "touches": _PLACE,
+    "near": _PLACE,
+    "within": _SIZE,
     "tool": _PLACE,
     "tool_at": _PLACE,
     "ground.height": _PLACE,

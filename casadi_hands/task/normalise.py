@@ -35,7 +35,11 @@ def normalise(task: Task) -> tuple[Task, list[Problem]]:
             continue
         snapped = _snap(finger.point, task.object, ("fingers", name, "touches"), problems)
         fingers[name] = finger.model_copy(update={"touches": snapped})
-    problems += [] if problems else _together(task, {name: finger.touches for name, finger in fingers.items()})
+    problems += (
+        []
+        if problems
+        else _together(task, {name: finger.point for name, finger in fingers.items() if finger.is_placed})
+    )
     if ground:
         snapped = _snap(ground.touches, task.object, ("ground", "touches"), problems)
         ground = ground.model_copy(update={"touches": snapped})
@@ -74,7 +78,7 @@ def _together(task: Task, moved: dict[str, Vector]) -> Iterator[Problem]:
     for number, name in enumerate(names):
         for other in names[:number]:
             if np.linalg.norm(np.subtract(moved[name], moved[other])) < room:
-                given = f"{list(task.fingers[name].touches)}"
+                given = f"{list(task.fingers[name].point)}"
                 allowed = f"a point whose nearest one on the surface, {list(moved[name])}, is not that of {other}"
                 yield Problem(("fingers", name, "touches"), given, allowed)
 

@@ -74,7 +74,7 @@ def _kind(value: Any) -> str:
 
 def _spelled_out(value: Any) -> Any:
     if isinstance(value, dict):  # YAML 1.1, which other programs write, takes `on` for true
-        return {"on" if name == "True" else name: each for name, each in value.items()}
+        return {"on" if name in ("true", "True") else name: each for name, each in value.items()}
     return {} if value == "anywhere" else value
 
 
