@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from casadi_hands.task.on_joint import joint_problems
 from casadi_hands.task.obstacles import depth_below, depth_in_palm, palm_depth_below
 from casadi_hands.task.problem import Problem
 from casadi_hands.task.region import Region
@@ -18,6 +19,8 @@ _LARGEST_TURN = 300.0
 # Depths below this share of the characteristic length are the rounding of numbers typed by hand.
 _TYPED = 1e-3
 _NAMELESS = "the name of one of object.shapes, and none has any: give it one, as in `sphere: {..., name: knob}`"
+# rad/s: what swings faster on its joint's spring is over before a simulation's time step is.
+_QUICKEST = 500.0
 
 
 def check(task: Task) -> list[Problem]:
@@ -25,7 +28,7 @@ def check(task: Task) -> list[Problem]:
     units = list(wrong_units(task))
     if units:  # what follows from them is no second mistake
         return units
-    timing = list(_goal_times(task)) + list(_goal_kinds(task)) + list(_other_times(task))
+    timing = list(_goal_times(task)) + list(_goal_kinds(task)) + list(_other_times(task)) + list(_attached(task))
     # Where things stand at the goals says nothing while the goals themselves are in doubt.
     places = [] if timing else list(_turns(task)) + list(_object_places(task)) + list(_palm_places(task))
     return timing + places + list(_contacts(task)) + list(_object_points(task))
@@ -72,8 +75,37 @@ def _other_times(task: Task) -> Iterator[Problem]:
             yield Problem(("perturbations", number, "to"), f"{perturbation.end:g}", allowed)
 
 
+def _attached(task: Task) -> Iterator[Problem]:
+    """What a joint to the world does not go with."""
+    if task.motion[0].exert is not None:
+        allowed = "exert of a later goal: it acts on the way there from the goal before"
+        yield Problem(("motion", 0, "exert"), "exert of the first goal", allowed)
+    held = task.object.attached
+    if held is None:
+        return
+    path = ("object", "attached")
+    if task.draws:
+        yield Problem(("tool",), f"a tool of an object on a {held.kind}", "goals of the joint: an angle or a distance")
+        return
+    if task.palm.motion or task.palm.may_move:
+        name = "motion" if task.palm.motion else "moves"
+        yield Problem(("palm", name), "a palm that moves", "a palm that stands, where the object is attached")
+    joint, body = held.joint, task.object
+    lever = np.cross(joint.direction, np.array(body.center_of_mass) - joint.pivot)
+    turned = joint.direction @ np.array(body.inertia) @ joint.direction + body.mass * (lever @ lever)
+    inertia = body.mass * joint.advance**2 + (turned if joint.turns else 0.0)
+    quick = float(np.sqrt(getattr(joint, "stiffness", 0.0) / inertia))
+    if quick > _QUICKEST:
+        given = f"{getattr(joint, 'stiffness', 0.0):g}, with which the object swings at {quick:.3g} rad/s"
+        allowed = f"at most {inertia * _QUICKEST**2:.3g}: {_QUICKEST:g} rad/s; is the object's mass or inertia too small?"
+        yield Problem((*path, held.kind, "stiffness"), given, allowed)
+    yield from joint_problems(body, task.motion, task.goal_turns())
+
+
 def _turns(task: Task) -> Iterator[Problem]:
     """Turns of goals from the first goal's orientation."""
+    if task.object.attached is not None:  # whose turns are its joint's
+        return
     for number, turn in enumerate(np.degrees(np.linalg.norm(task.goal_turns(), axis=1))):
         if turn > _LARGEST_TURN * (1 + 1e-6):
             allowed = (
@@ -113,7 +145,7 @@ def _palm_places(task: Task) -> Iterator[Problem]:
 
 def _contacts(task: Task) -> Iterator[Problem]:
     names = list(task.fingers)
-    if len(names) == 1 and any(task.gravity) and not task.ground:
+    if len(names) == 1 and any(task.gravity) and not task.ground and not task.object.attached:
         allowed = "two or more; a single contact cannot hold an object against gravity"
         yield Problem(("fingers",), "one finger", allowed)
     for number, name in enumerate(names):

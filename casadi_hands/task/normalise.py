@@ -9,6 +9,7 @@ import numpy as np
 from casadi_hands.task.fields import Vector, vector
 from casadi_hands.task.motion import Goal
 from casadi_hands.task.object import ManipulatedObject
+from casadi_hands.task.on_joint import placed
 from casadi_hands.task.problem import Problem
 from casadi_hands.task.task import Task
 
@@ -101,10 +102,15 @@ def _recentre(task: Task) -> Task:
             return goal
         return goal.model_copy(update={"position": vector(np.array(goal.position) + goal.rotation.matrix @ center)})
 
-    shapes = tuple(shape.moved(-center) for shape in body.shapes)
+    moved = {
+        "shapes": tuple(shape.moved(-center) for shape in body.shapes),
+        "center_of_mass": origin,
+        "attached": body.attached and body.attached.moved(-center),
+    }
+    body = body.model_copy(update=moved)
     return task.model_copy(
         update={
-            "object": body.model_copy(update={"shapes": shapes, "center_of_mass": origin}),
+            "object": body,
             "fingers": {
                 name: finger.model_copy(
                     update={
@@ -116,6 +122,6 @@ def _recentre(task: Task) -> Task:
             },
             "ground": task.ground and task.ground.model_copy(update={"touches": shift(task.ground.touches)}),
             "tool": task.tool and shift(task.tool),
-            "motion": tuple(shift_goal(goal) for goal in task.motion),
+            "motion": placed(tuple(shift_goal(goal) for goal in task.motion), body),
         }
     )

@@ -7,6 +7,7 @@ from typing import Any, Self
 import numpy as np
 from pydantic import Field, ValidationError, field_validator, model_validator
 
+from casadi_hands.task.attached import Attached
 from casadi_hands.task.fields import Matrix, Positive, Section, Vector, follows, refuse, vector
 from casadi_hands.task.mesh import Mesh, MeshRecord, Uniform
 from casadi_hands.task.shapes import SECTIONS, Primitive, Shape, parts_of, spelled
@@ -60,6 +61,9 @@ class ManipulatedObject(Section):
         default_factory=follows(_uniform_inertia),
         description="Inertia about the centre of mass, 3 rows of 3, kg·m², axes of the object frame.",
         json_schema_extra={"default": "that of the primitives about their own centre; overlaps count twice"},
+    )
+    attached: Attached | None = Field(
+        default=None, description="The joint that holds the object to the world; without it the object is free."
     )
 
     meshes: tuple[MeshRecord, ...] | None = Field(

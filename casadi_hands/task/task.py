@@ -25,6 +25,7 @@ from casadi_hands.task.limits import USUAL_DEFLECTION, Limits, usual_replay_posi
 from casadi_hands.task.material import hinge_loads
 from casadi_hands.task.motion import Goal, Perturbation
 from casadi_hands.task.object import ManipulatedObject
+from casadi_hands.task.on_joint import placed
 from casadi_hands.task.palm import Palm
 from casadi_hands.task.region import counted_fingers
 from casadi_hands.task.search import Search
@@ -86,6 +87,11 @@ class Task(Section):
 
     # Defaults that follow from other sections. Where such a section is itself wrong the task is refused anyway,
     # and any valid number will do to let the rest of this section be checked.
+
+    @field_validator("motion")
+    @classmethod
+    def _on_joint(cls, value: tuple[Goal, ...], info: ValidationInfo) -> tuple[Goal, ...]:
+        return placed(value, info.data.get("object"))
 
     @field_validator("palm", mode="before")
     @classmethod
