@@ -39,7 +39,8 @@ class Holding:
     """What holding the object takes at a keyframe.
 
     Attributes:
-        missing: (6,) wrench that the contacts cannot make, m·g and m·g·length, object frame.
+        missing: (6,) wrench that the contacts cannot make, m·g and m·g·length, object frame; of an attached object what
+            they cannot make along its joint, (1,).
         hardest: the least that the hardest-pressed contact must press with to make the rest, m·g.
     """
 
@@ -71,7 +72,7 @@ def holdings(model: Model, floating: Floating, friction: float | None = None) ->
         forces = spread_forces(normals, mu[active])
         fingers = int(active[: model.contacts].sum())
         twists = torsion_edges(points[active][:fingers], normals[:fingers], model.torsion)
-        wrenches = np.hstack([grasp_map(points[active]) @ forces, twists])
+        wrenches = model.unborne(np.hstack([grasp_map(points[active]) @ forces, twists]))
         made = wrenches @ nonnegative_fit(wrenches, needed)[0]
         # Normal forces: every edge has one of unit length.
         count = int(active.sum())
@@ -165,9 +166,9 @@ def _load(model: Model, design: Result, k: int) -> Load | None:
     points = motion.contact_point_object[k, contacts] / model.units.length
     normals = inward_normals(points, [model.touched[c] for c in contacts])
     forces = spread_forces(normals, np.full(len(contacts), model.friction))
-    wrenches = grasp_map(points) @ forces
+    wrenches = model.unborne(grasp_map(points) @ forces)
     planned = (motion.contact_force[k, contacts] @ turn / model.units.force).reshape(-1)
-    needed = grasp_map(points) @ planned
+    needed = model.unborne(grasp_map(points) @ planned)
     made = wrenches @ nonnegative_fit(wrenches, needed)[0]
     if np.linalg.norm(needed - made) > HELD:
         return None

@@ -42,6 +42,9 @@ _SHAPES: dict[str, tuple[str | int, ...]] = {
     "contact_force_disturbed": ("S", "C", 3),
     "external_force_disturbed": ("S", 3),
     "external_torque_disturbed": ("S", 3),
+    "attachment_position": ("S",),
+    "attachment_velocity": ("S",),
+    "attachment_friction": ("S",),
 }
 _OPTIONAL = frozenset(item.name for item in fields(Motion) if item.default is None)
 _NO_TURN = 1e-3

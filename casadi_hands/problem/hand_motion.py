@@ -17,6 +17,21 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
+class OnJoint:
+    """How an attached object goes along its joint at the samples.
+
+    Attributes:
+        coordinate: (S,) rad, of a slider lengths.
+        speed: (S,) of it, over s.
+        friction: (S,) dry friction along it, m·g·length, of a slider m·g.
+    """
+
+    coordinate: Array
+    speed: Array
+    friction: Array
+
+
+@dataclass(frozen=True)
 class WholeHand:
     """A motion of object and hand at the samples; nondimensional, see ``Model``.
 
@@ -36,6 +51,7 @@ class WholeHand:
         torsion: (S, C) moments on the object about its outward normals, over the radius of the torsional friction: m·g;
             None of hard points.
         coupling: how motors turn the joints; None where each joint has its own.
+        on_joint: how an attached object goes along its joint; None of a free one, and before the refinement.
     """
 
     fingers: tuple[FingerSeed, ...]
@@ -52,6 +68,7 @@ class WholeHand:
     disturbed: Array | None = None
     torsion: Array | None = None
     coupling: Coupling | None = None
+    on_joint: OnJoint | None = None
 
 
 def turned(start: Array, vector: Array) -> Array:

@@ -88,7 +88,7 @@ class Acting:
         force: (3,) m·g, world, besides gravity.
         torque: (3,) m·g·length, world.
         turn: (3, 3) world <- object.
-        needed: (6,) wrench that contacts must make, object frame.
+        needed: (6,) wrench that contacts must make, object frame; of an attached object along its joint, (1,).
         grounded: whether the ground may carry.
     """
 
@@ -107,12 +107,13 @@ def acting(model: Model) -> Iterator[Acting]:
     ways = linear(schedule.keyframes[list(schedule.goals)], schedule.samples)
     # Goals first, so that what is the same at one and on the way to it is told of the goal.
     order = [*schedule.goal_samples, *range(len(ways))]
-    reference = pin.Quaternion(*model.reference).matrix()
+    reference, resisted = pin.Quaternion(*model.reference).matrix(), _resisted(model, ways)
     for scenario in model.scenarios:
         for k in order:
             turn = pin.exp3(ways[k] @ model.goal_vectors) @ reference
             force, torque = scenario.force[k], scenario.torque[k]
             needed = -np.concatenate([turn.T @ (model.gravity + force), turn.T @ torque])
+            needed = model.unborne(needed) + resisted[k]
             place = ways[k] @ model.goal_positions - (0.0 if model.tool is None else turn @ model.tool)
             grounded = model.ground is not None and bool((place + turn @ model.patches[-1])[2] <= model.ground + _NEAR)
             # The ground's own normal, and how the object stands on it, change with the turn.
@@ -147,4 +148,14 @@ def _balances(model: Model) -> Iterator[tuple[float, Array, Array, Array, Array,
         forces, wrenches = cones(
             points[:count], normals[:count], model.frictions[:count], model.torsion, model.contacts
         )
+        wrenches = model.unborne(wrenches)
         yield float(model.schedule.samples[each.sample]), each.force, each.torque, forces, wrenches, each.needed
+
+
+def _resisted(model: Model, ways: Array) -> Array:
+    """What spring and friction of a joint ask for (S, 1), with weights (S, G) of the goals; 0 of a free object."""
+    if model.attachment is None:
+        return np.zeros((len(ways), 1))
+    joint, coordinates = model.attachment, ways @ model.attachment.goals
+    ahead = np.sign(np.round(np.gradient(coordinates), 12))
+    return np.asarray((joint.stiffness * coordinates + joint.friction * ahead)[:, None])

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from casadi_hands.geometry.bodies import Body
 from casadi_hands.motion import Schedule, zero_order_hold
+from casadi_hands.problem.attachment import Attachment
 from casadi_hands.problem.contacts import Contact
+from casadi_hands.problem.exerted import Exerted
 from casadi_hands.problem.palm_path import PalmPath
 from casadi_hands.problem.scenario import Scenario
 from casadi_hands.problem.units import Units
@@ -57,6 +59,8 @@ class Model:
         reference: (4,) quaternion of the reference orientation.
         tool: (3,) object frame, or None when goals are poses.
         scenarios: the motion as planned, and if the task disturbs it, the same with what does.
+        exerted: what the object must exert on the world, whose answer is in all scenarios.
+        attachment: the joint that holds the object to the world, or None of a free one.
         link_radius: of all links.
         bend: largest of a link at zero angle, rad.
         axis_cosines: least and largest cosine of a joint's axis and the links beside it.
@@ -111,6 +115,8 @@ class Model:
     sliding: float = 0.0
     servo: float = 0.0
     regrasp: Regrasp | None = None
+    exerted: tuple[Exerted, ...] = ()
+    attachment: Attachment | None = None
     motors: int = 0
     ratios: tuple[float, float] = (0.1, 2.0)
     own_terms: tuple[OwnTerm, ...] = ()
@@ -215,8 +221,14 @@ class Model:
 
     @property
     def disturbance(self) -> Scenario | None:
-        """The scenario in which something acts from outside; None where the task asks for none."""
-        return self.scenarios[1] if len(self.scenarios) > 1 else None
+        """What acts from outside in the second scenario beside the plan; None where the task asks for none."""
+        if len(self.scenarios) == 1:
+            return None
+        return self.scenarios[1].plus(self.scenarios[0], -1.0) if self.exerted else self.scenarios[1]
+
+    def unborne(self, wrenches: Array) -> Array:
+        """What of wrenches (6, ...), object frame, contacts have to balance: all, or what a joint lets go (1, ...)."""
+        return wrenches if self.attachment is None else self.attachment.twist[None] @ wrenches
 
 
 def palm_from_world(model: Model, time: float) -> tuple[Array, Array]:

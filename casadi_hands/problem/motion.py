@@ -15,7 +15,7 @@ class Motion:
 
     Moments of contacts are None of hard fingertips. Commands are None until there is a hand, and in files of versions
     that did not write them; positions of motors are None where every joint has its own; what is disturbed is None where
-    the task names no disturbance.
+    the task names no disturbance; what is of the attachment is None of an object that is free.
     """
 
     time: np.ndarray
@@ -41,3 +41,6 @@ class Motion:
     contact_force_disturbed: np.ndarray | None = None
     external_force_disturbed: np.ndarray | None = None
     external_torque_disturbed: np.ndarray | None = None
+    attachment_position: np.ndarray | None = None
+    attachment_velocity: np.ndarray | None = None
+    attachment_friction: np.ndarray | None = None

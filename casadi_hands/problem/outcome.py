@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from casadi_hands.geometry.bodies.capsule import Capsule
 from casadi_hands.geometry.contact_points import on_bodies, rounded_normals
 from casadi_hands.kinematics.numeric import link_frames
+from casadi_hands.problem.attachment import MOVING, dry_friction
 from casadi_hands.problem.drive import Drive
 from casadi_hands.problem.floating_motion import Floating
-from casadi_hands.problem.hand_motion import WholeHand
+from casadi_hands.problem.hand_motion import OnJoint, WholeHand
 from casadi_hands.problem.model import Model, sampled_points
 from casadi_hands.problem.motion import Motion
 from casadi_hands.problem.motors import shared_motor
@@ -73,6 +74,7 @@ def whole_hand_motion(model: Model, result: WholeHand) -> Motion:
     contacts = tuple(names[c] for c in touch), [links[c] for c in touch]
     active, force, point, on_link = result.active[:, touch], result.force[:, touch], point[:, touch], on_link[:, touch]
     motion = motion_in_si(model, *object_pose, *palm, angles, joint_names, *contacts, active, force, point, on_link)
+    motion = _on_joint(model, motion, result)
     if result.torsion is not None:
         # As physics had them: where contacts pass a kink of the surface, true normals turn at once.
         normals = np.stack([rounded_normals(point[:, k], model.touched[c]) for k, c in enumerate(touch)], axis=1)
@@ -86,8 +88,27 @@ def whole_hand_motion(model: Model, result: WholeHand) -> Motion:
     return replace(
         motion,
         contact_force_disturbed=np.einsum("sij,scj->sci", rotations, result.disturbed[:, touch]) * model.units.force,
-        external_force_disturbed=disturbance.force * model.units.force,
-        external_torque_disturbed=disturbance.torque * model.units.torque,
+        external_force_disturbed=model.scenarios[1].force * model.units.force,
+        external_torque_disturbed=model.scenarios[1].torque * model.units.torque,
+    )
+
+
+def _on_joint(model: Model, motion: Motion, result: WholeHand) -> Motion:
+    """The motion with how an attached object goes along its joint; before the refinement as its poses say."""
+    joint = model.attachment
+    if joint is None:
+        return motion
+    found = result.on_joint
+    if found is None:
+        coordinate = joint.coordinates(result.position, result.vector)
+        speed = np.gradient(coordinate, model.schedule.samples)
+        found = OnJoint(coordinate, speed, dry_friction(joint, speed, MOVING))
+    unit, force = (1.0, model.units.torque) if joint.turning else (model.units.length, model.units.force)
+    return replace(
+        motion,
+        attachment_position=found.coordinate * unit,
+        attachment_velocity=found.speed * unit,
+        attachment_friction=found.friction * force,
     )
 
 

@@ -74,7 +74,7 @@ def poses_at(model: Model, keyframes: Array, offset: int = 0) -> Array:
 
 
 def _all_moved(model: Model, poses: Array, samples: NDArray[np.int64], back: bool) -> Array:
-    if stands(model):
+    if stands(model) or model.attachment is not None:
         return poses
     palm = np.hstack([model.palm_position, model.palm_quaternion])
     gone = _since(palm[0], palm)
@@ -82,7 +82,7 @@ def _all_moved(model: Model, poses: Array, samples: NDArray[np.int64], back: boo
 
 
 def _carries(model: Model) -> bool:
-    return model.tool is None and not stands(model)
+    return model.tool is None and model.attachment is None and not stands(model)
 
 
 def stands(model: Model) -> bool:

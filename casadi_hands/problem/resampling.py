@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from casadi_hands.geometry.contact_points import on_bodies
 from casadi_hands.motion import Schedule, catmull_rom, continuous, linear, nearest_exponential, zero_order_hold
 from casadi_hands.problem.coupling import Coupling
+from casadi_hands.problem.exerted import planned
 from casadi_hands.problem.hand_motion import WholeHand, turned
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.palm_motion import carried_by_palm, goals_seen_from_palm, stands
@@ -28,6 +29,8 @@ def resampled_model(model: Model, schedule: Schedule) -> Model:
     first = zero_order_hold(was, now)
     end = np.append(np.searchsorted(was, now[1:] - 1e-9), len(was))
 
+    plan = planned(now, model.exerted)
+
     def coarser(scenario: Scenario) -> Scenario:
         size = np.linalg.norm(np.hstack([scenario.force, scenario.torque]), axis=1)
         return scenario.at(np.array([i + np.argmax(size[i : max(i + 1, j)]) for i, j in zip(first, end, strict=True)]))
@@ -38,7 +41,7 @@ def resampled_model(model: Model, schedule: Schedule) -> Model:
         schedule=schedule,
         palm_position=palm[:, :3],
         palm_quaternion=palm[:, 3:],
-        scenarios=tuple(map(coarser, model.scenarios)),
+        scenarios=(plan, *([] if model.disturbance is None else [coarser(model.disturbance).plus(plan)])),
     )
 
 
@@ -78,6 +81,7 @@ def resampled(hand: WholeHand, before: Model, after: Model) -> WholeHand:
         force=np.tensordot(straight, hand.force, axes=1),
         active=hand.active[zero_order_hold(was, now)],
         disturbed=None,
+        on_joint=None,
         torsion=None if hand.torsion is None else straight @ hand.torsion,
         coupling=_on_samples(hand.coupling, between),
     )
@@ -112,8 +116,14 @@ def _matrix(quaternion: Array) -> Array:
 def shortened(model: Model, homotopy: float) -> Model:
     """The task for a homotopy parameter: that part of what leads from its first goal to each of the others.
 
-    No contact is planned to move. A palm moves as far as ever; scaled is what the object moves as seen from it.
+    No contact is planned to move. A palm moves as far as ever; scaled is what the object moves as seen from it, of an
+    attached one how far its joint moves.
     """
+    if model.attachment is not None:
+        scaled = model.attachment.towards(homotopy)
+        poses = scaled.poses(scaled.goals)
+        goals = {"goal_positions": poses[:, :3], "goal_vectors": poses[:, 3:]}
+        return replace(model, attachment=scaled, regrasp=None, **goals)
     seen = goals_seen_from_palm(model)
     goals = carried_by_palm(model, seen[0] + homotopy * (seen - seen[0]), model.schedule.goal_samples)
     return replace(model, goal_positions=goals[:, :3], goal_vectors=goals[:, 3:], regrasp=None)

@@ -33,7 +33,6 @@ class Scenario:
         """The same at some of its samples."""
         return replace(self, force=self.force[samples], torque=self.torque[samples])
 
-
-def planned(samples: int) -> Scenario:
-    """The motion as planned: nothing acts from outside."""
-    return Scenario("", np.zeros((samples, 3)), np.zeros((samples, 3)))
+    def plus(self, other: Scenario, sign: float = 1.0) -> Scenario:
+        """The same with what acts in another one added, or taken off."""
+        return replace(self, force=self.force + sign * other.force, torque=self.torque + sign * other.torque)

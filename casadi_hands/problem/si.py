@@ -22,7 +22,7 @@ from casadi_hands.problem.model import Model
 from casadi_hands.problem.motion import Motion
 from casadi_hands.problem.palm_path import PalmPath
 from casadi_hands.problem.placement import object_rotation, torques_in_all
-from casadi_hands.problem.scenario import Scenario, planned
+from casadi_hands.problem.outside import attached, attachment_of, exerted_of, scenarios_of
 from casadi_hands.problem.units import STANDARD_GRAVITY, Units, round_off
 from casadi_hands.task import Task
 
@@ -72,7 +72,8 @@ def build_model(task: Task) -> Model:
         slip_tolerance=round_off(min(0.2 * task.limits.slip / length, _MOST_SLIP)),
         reference=reference,
         tool=None if not task.draws else round_off(np.asarray(task.tool) / length),
-        scenarios=_scenarios(task, schedule, units),
+        scenarios=scenarios_of(task, schedule, units),
+        exerted=exerted_of(task, units),
         link_radius=round_off(task.hand.link_radius / length),
         hinge=round_off(task.hand.hinge_length / length),
         link_length=(round_off(task.hand.link_length[0] / length), round_off(task.hand.link_length[1] / length)),
@@ -89,6 +90,8 @@ def build_model(task: Task) -> Model:
         clearance=round_off(task.hand.clearance / length),
         ratios=task.hand.ratios,
     )
+    if task.object.attached is not None:
+        model = attached(model, attachment_of(task, units, reference))
     return model if given or not task.is_placed else replace(model, force_limit=usual_force_limit(model))
 
 
@@ -130,19 +133,6 @@ def _goals(task: Task) -> tuple[Array, Array, Array]:
         return points, np.zeros((len(points), 3)), np.array([1.0, 0.0, 0.0, 0.0])
     positions = np.array([goal.position for goal in task.motion], float)
     return positions, task.goal_turns(), quaternion(task.motion[0].rotation.matrix)
-
-
-def _scenarios(task: Task, schedule: Schedule, units: Units) -> tuple[Scenario, ...]:
-    """The motion as planned and, if the task disturbs it, the same with the forces and torques that do."""
-    forces, torques = np.zeros((2, len(schedule.samples), 3))
-    for each in task.perturbations:
-        during = (schedule.samples >= each.start - 1e-9) & (schedule.samples <= each.end + 1e-9)
-        if not during.any():  # a short one between two samples
-            during[np.argmin(np.abs(schedule.samples - (each.start + each.end) / 2))] = True
-        forces[during] += np.asarray(each.force)
-        torques[during] += np.asarray(each.torque)
-    disturbed = Scenario("_perturbed", round_off(forces / units.force), round_off(torques / units.torque))
-    return planned(len(schedule.samples)), *([disturbed] if disturbed.acts.any() else [])
 
 
 RESERVE = 1.5  # of torque and speed limits over what the motion uses, where the task names none
@@ -269,8 +259,8 @@ def motion_in_si(
         contact_force=np.einsum("sij,scj->sci", rotations, force) * units.force,
         contact_point_object=point * units.length,
         contact_point_link=on_link * scale[None, :, None],
-        external_force=np.zeros_like(position),
-        external_torque=np.zeros_like(position),
+        external_force=model.scenarios[0].force * units.force,
+        external_torque=model.scenarios[0].torque * units.torque,
     )
 
 

@@ -25,6 +25,8 @@ class Joint(Section):
 
     turns: ClassVar[bool] = True
     axis: Vector = Field(description="Its direction.")
+    stiffness: NonNegative = Field(default=0.0, description="Of its spring.")
+    damping: NonNegative = Field(default=0.0, description="Of its damper.")
 
     @field_validator("axis")
     @classmethod

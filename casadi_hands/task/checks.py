@@ -94,9 +94,9 @@ def _attached(task: Task) -> Iterator[Problem]:
     lever = np.cross(joint.direction, np.array(body.center_of_mass) - joint.pivot)
     turned = joint.direction @ np.array(body.inertia) @ joint.direction + body.mass * (lever @ lever)
     inertia = body.mass * joint.advance**2 + (turned if joint.turns else 0.0)
-    quick = float(np.sqrt(getattr(joint, "stiffness", 0.0) / inertia))
+    quick = float(np.sqrt(joint.stiffness / inertia))
     if quick > _QUICKEST:
-        given = f"{getattr(joint, 'stiffness', 0.0):g}, with which the object swings at {quick:.3g} rad/s"
+        given = f"{joint.stiffness:g}, with which the object swings at {quick:.3g} rad/s"
         allowed = f"at most {inertia * _QUICKEST**2:.3g}: {_QUICKEST:g} rad/s; is the object's mass or inertia too small?"
         yield Problem((*path, held.kind, "stiffness"), given, allowed)
     yield from joint_problems(body, task.motion, task.goal_turns())

@@ -27,6 +27,9 @@ ENOUGH_CONTACTS = Constraint("sum", "section 2.2.1")
 DEFECT = Constraint(
     "defect", "Newton–Euler from knot to knot", "", "be moved as planned by the forces of its contacts", _PACE, _BALANCE
 )
+ON_JOINT = Constraint(
+    "on_joint", "the joint's pose and velocity", "", "stay on the joint that holds it", _PACE, _BALANCE
+)
 WRENCH_OF_CONTACTS = replace(DEFECT, name="sum", equation="eq. 2.5 and 2.6: the contacts' wrench")
 TORSION_OF_CONTACTS = replace(DEFECT, name="torsion", equation="eq. 2.5: the torsion of all contacts")
 EQUILIBRIUM = Constraint("sum", "rest without a jolt", "", "be held still at the start and the end", _PACE, _BALANCE)

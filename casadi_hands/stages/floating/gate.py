@@ -10,6 +10,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from casadi_hands.geometry.contact_points import inward_normals
+from casadi_hands.problem.attachment import MOVING, dry_friction
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.palm_motion import poses_at
 from casadi_hands.statics.grasp import EDGES, friction_edges, grasp_map, torsion_edges
@@ -25,13 +26,16 @@ def least_squares_forces(model: Model, rotation: Array) -> Array:
     """Contact forces (C, 3) in the object's frame that hold its weight: a normal preload, corrected to balance."""
     points = model.patches
     preload = _PRELOAD * inward_normals(points, model.touched)
-    grasp = grasp_map(points)
-    missing = np.concatenate([-rotation.T @ model.gravity, np.zeros(3)]) - grasp @ preload.reshape(-1)
+    grasp = model.unborne(grasp_map(points))
+    weight = np.concatenate([-rotation.T @ model.gravity, np.zeros(3)])
+    missing = model.unborne(weight) - grasp @ preload.reshape(-1)
     return preload + (np.linalg.pinv(grasp) @ missing).reshape(-1, 3)
 
 
 def needed_wrenches(model: Model, pose: Array) -> Array:
     """Wrench (N, 6) in m·g and m·g·length, object frame, that contacts must make at each keyframe of a motion.
+
+    Of an attached object what they must make along its joint's coordinate, (N, 1).
 
     Args:
         model: the task.
@@ -49,8 +53,17 @@ def needed_wrenches(model: Model, pose: Array) -> Array:
         omega, alpha = (spins[0] + spins[1]) / 2, (spins[1] - spins[0]) / schedule.step
         force = turns[1].T @ (inertial * acceleration[k] - model.gravity)
         torque = inertial * (np.cross(omega, model.inertia @ omega) + model.inertia @ alpha)
+        if model.exerted:
+            force -= turns[1].T @ model.scenarios[0].force[at[k]]
+            torque -= turns[1].T @ model.scenarios[0].torque[at[k]]
         wrenches.append(np.concatenate([force, torque]))
-    return np.array(wrenches)
+    if model.attachment is None:
+        return np.array(wrenches)
+    joint = model.attachment
+    coordinates = [joint.coordinates(rows[:, :3], rows[:, 3:]) for rows in (before, now, after)]
+    speeds = (coordinates[2] - coordinates[0]) / (2 * schedule.step)
+    resisted = joint.resistance(coordinates[1], speeds) + dry_friction(joint, speeds, MOVING)
+    return np.asarray(model.unborne(np.array(wrenches).T).T - resisted[:, None])
 
 
 def passes_gate(model: Model, values: Mapping[str, Array], pivots: bool = False) -> bool:
@@ -71,8 +84,8 @@ def passes_gate(model: Model, values: Mapping[str, Array], pivots: bool = False)
         needed = wrenches_needed[k]
         if not active.any():
             return False
-        grasp = grasp_map(points[active])
-        all_hold = np.linalg.matrix_rank(grasp_map(points), 1e-6)
+        grasp = model.unborne(grasp_map(points[active]))
+        all_hold = np.linalg.matrix_rank(model.unborne(grasp_map(points)), 1e-6)
         if np.linalg.matrix_rank(grasp, 1e-6) < (min(all_hold, _PIVOT_RANK) if pivots else all_hold):
             return False
         inward = inward_normals(points[active], list(compress(bodies, active)))
@@ -83,6 +96,6 @@ def passes_gate(model: Model, values: Mapping[str, Array], pivots: bool = False)
             wrenches[3:, span] = np.cross(point[None, :], edges[:, span].T).T
         fingers = int(active[: model.contacts].sum())
         twists = torsion_edges(points[active][:fingers], inward[:fingers], model.torsion)
-        if nonnegative_fit(np.hstack([wrenches, twists]), needed)[1] > _GATE:
+        if nonnegative_fit(model.unborne(np.hstack([wrenches, twists])), needed)[1] > _GATE:
             return False
     return True

@@ -87,6 +87,9 @@ def bind_object(problem: Problem, model: Model, side: ObjectSide, palm: Rows | N
         problem.parameter(name, (1, width))
     for name in ("friction", "sharpness", "clearance", "ground_height"):
         problem.parameter(name, (1, 1))
+    if model.attachment is not None:
+        problem.parameter("freedom", (1, 6))
+        problem.parameter("resistance", (sizes(model)[1], 1))
     for scenario, force in zip(model.scenarios, side.forces, strict=True):
         _bind_scenario(problem, model, side, force, scenario.suffix)
     _bind_points(problem, model, side)
@@ -97,22 +100,24 @@ def bind_object(problem: Problem, model: Model, side: ObjectSide, palm: Rows | N
 def _bind_scenario(problem: Problem, model: Model, side: ObjectSide, force: Rows, suffix: str) -> None:
     """Physics and contact forces of one scenario; only the first pays for the motion, which all share."""
     samples, contacts = sizes(model)[1:]
+    joint = "" if model.attachment is None else "turning" if model.attachment.turning else "sliding"
     external = {
         f"external_{kind}": problem.parameter(
-            f"external_{kind}{suffix}", (samples if suffix else 1, 3), quantity=f"external_{kind}"
+            f"external_{kind}{suffix}", (samples if suffix or model.exerted else 1, 3), quantity=f"external_{kind}"
         )
         for kind in ("force", "torque")
     }
     if not suffix:
         external["carried_acceleration"] = problem.parameter("carried_acceleration", (samples, 3))
     problem.bind(
-        kernels.dynamics(contacts, suffix, regularise=not suffix),
+        kernels.dynamics(contacts, suffix, not suffix, joint),
         pose=side.pose,
         points=side.point[1],
         forces=force,
         invariant=side.invariant,
         **problem.given("reference", "step", "gravity", "inertia", "inertial"),
         **external,
+        **({} if model.attachment is None else problem.given("freedom", "resistance")),
     )
     for i, body in enumerate(model.touched[: model.contacts]):
         problem.bind(

@@ -21,15 +21,17 @@ _MARKS = 3  # points that stand for a capsule, of which the weight is
 
 
 @cache
-def dynamics(contacts: int, suffix: str = "", regularise: bool = True) -> Kernel:
+def dynamics(contacts: int, suffix: str = "", regularise: bool = True, joint: str = "") -> Kernel:
     """Newton–Euler at one sample (eq. 2.5, 2.6) and the object's accelerations (eq. 2.14, 2.15).
 
-    What a palm that moves carries is accelerated with it; only what differs from that costs.
+    What a palm that moves carries is accelerated with it; only what differs from that costs. Of an object on a joint
+    balance is asked along its one freedom, where the joint resists, too.
 
     Args:
         contacts: number of contacts, the ground's included.
         suffix: of the term names, for a second scenario.
         regularise: whether to add the terms that do not depend on forces.
+        joint: ``turning`` or ``sliding`` of an object that is attached by one.
     """
     kernel = Kernel("dynamics" + suffix)
     poses = [kernel.variable(f"pose{i}", 6, "pose", i) for i in range(3)]
@@ -45,17 +47,18 @@ def dynamics(contacts: int, suffix: str = "", regularise: bool = True) -> Kernel
     omega, alpha = angular_motion(before[1], now[1], after[1], step)
     rotation = rotation_matrix(now[1])
     inertial_torque = inertial * motion_terms.gyroscopic(inertia, omega, alpha)
-    kernel.cost(
-        motion_terms.LINEAR_MOMENTUM,
-        motion_terms.linear_momentum(ca.mtimes(rotation, forces), invariant, gravity, external, acceleration, inertial),
-        suffix,
-    )
     local_torque = ca.mtimes(rotation.T, external_torque)
-    kernel.cost(
-        motion_terms.ANGULAR_MOMENTUM,
-        motion_terms.angular_momentum(points, forces, invariant, local_torque, inertial_torque),
-        suffix,
-    )
+    in_world = ca.mtimes(rotation, forces)
+    linear = motion_terms.linear_momentum(in_world, invariant, gravity, external, acceleration, inertial)
+    angular = motion_terms.angular_momentum(points, forces, invariant, local_torque, inertial_torque)
+    if joint:
+        free = kernel.parameter("freedom", 6)
+        along = ca.dot(free, ca.vertcat(ca.mtimes(rotation.T, linear), angular)) + kernel.parameter("resistance")
+        law = motion_terms.ANGULAR_MOMENTUM if joint == "turning" else motion_terms.LINEAR_MOMENTUM
+        kernel.cost(law, along, suffix)
+    else:
+        kernel.cost(motion_terms.LINEAR_MOMENTUM, linear, suffix)
+        kernel.cost(motion_terms.ANGULAR_MOMENTUM, angular, suffix)
     if regularise:
         kernel.cost(motion_terms.OBJECT_ACCELERATION, acceleration - kernel.parameter("carried_acceleration", 3))
         kernel.cost(motion_terms.OBJECT_ANGULAR_ACCELERATION, inertial_torque / step)

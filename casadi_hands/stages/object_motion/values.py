@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from casadi_hands.motion import linear, time_scaled
 from casadi_hands.nlp import Problem
+from casadi_hands.problem.attachment import MOVING, dry_friction
 from casadi_hands.problem.model import Model, sizes
-from casadi_hands.problem.palm_motion import carried_along, carried_by_palm, goals_seen_from_palm
+from casadi_hands.problem.palm_motion import carried_along, carried_by_palm, goals_seen_from_palm, poses_at
 from casadi_hands.stages.own_terms import own_values
 
 Array = NDArray[np.float64]
@@ -42,6 +43,8 @@ def straight_path(model: Model) -> Array:
     A drawing's object stays upright, and its tool on the straight way in the world.
     """
     between, schedule = _between_goals(model, model.schedule.keyframes), model.schedule
+    if model.attachment is not None:
+        return model.attachment.poses(between @ model.attachment.goals)
     if model.tool is not None:
         return between @ np.hstack([model.goal_positions - model.tool, model.goal_vectors])
     return carried_by_palm(model, between @ goals_seen_from_palm(model), schedule.keyframe_samples)
@@ -55,7 +58,12 @@ def carried_acceleration(model: Model) -> Array:
 
 
 def pose_bounds(model: Model) -> tuple[Array, Array]:
-    """Box bounds (N, 6) of the keyframe poses: close to the goals, else as far as coordinates serve."""
+    """Box bounds (N, 6) of the keyframe poses: close to the goals, else as far as coordinates serve.
+
+    An attached object goes its one way, and when is left to the refinement.
+    """
+    if model.attachment is not None:
+        return straight_path(model), straight_path(model)
     widest = np.tile([np.inf] * 3 + [MOST_TURN] * 3, (sizes(model)[0], 1))
     lower, upper = -widest, widest
     if model.tool is None:
@@ -89,6 +97,8 @@ def object_parameters(model: Model) -> dict[str, Array | float]:
         values["tool"], values["targets"] = model.tool, tool_path(model)
     else:
         values["vectors"] = model.goal_vectors
+    if model.attachment is not None:
+        values["freedom"], values["resistance"] = model.attachment.twist, _resistance(model)
     for scenario in model.scenarios:
         suffix = scenario.suffix
         for i, body in enumerate(model.touched[: model.contacts]):
@@ -96,13 +106,23 @@ def object_parameters(model: Model) -> dict[str, Array | float]:
         if model.ground is not None:
             values[f"ground_body{suffix}"] = model.touched[-1].parameters
             values[f"ground_friction{suffix}"] = float(model.frictions[-1])
-        # Of the motion as planned all rows are the same.
-        rows = slice(None) if suffix else slice(1)
+        # Of the motion as planned all rows are the same, where nothing is exerted on the world.
+        rows = slice(None) if suffix or model.exerted else slice(1)
         values[f"external_force{suffix}"], values[f"external_torque{suffix}"] = (
             scenario.force[rows],
             scenario.torque[rows],
         )
     return values
+
+
+def _resistance(model: Model) -> Array:
+    """What spring, damper and friction of the joint exert along it at the samples, (S, 1)."""
+    joint, schedule = model.attachment, model.schedule
+    assert joint is not None
+    before, now, after = (poses_at(model, straight_path(model), offset) for offset in (-1, 0, 1))
+    coordinates = [joint.coordinates(rows[:, :3], rows[:, 3:]) for rows in (before, now, after)]
+    speeds = (coordinates[2] - coordinates[0]) / (2 * schedule.step)
+    return np.asarray((joint.resistance(coordinates[1], speeds) + dry_friction(joint, speeds, MOVING))[:, None])
 
 
 def term_weights(problem: Problem, model: Model, weights: Mapping[str, float]) -> dict[str, Array | float]:

@@ -19,6 +19,10 @@ from casadi_hands.stages.synthesis.stage import AXIS_RANGE
 
 JOINT_MARGIN = 0.005  # rad, so that a smooth curve through the knots stays within the limits between them
 HOLDING = 0.4  # share of its torsion that a contact at rest may need: tips differ, and age
+JOINT_HOLDING = 0.5
+"""Share of a joint's friction that balance may ask for at rest: with any speed's that is never more than all of it."""
+JOINT_SIZES = {"turn_axis": 3, "joint_axis": 3, "pivot": 3, "joint_start": 3, "advance": 1, "freedom": 6}
+JOINT_SIZES |= {"joint_mass": 1, "joint_friction": 1, "joint_stiffness": 1, "joint_damping": 1}
 FREE = (-np.inf, np.inf)
 IN_CONE = {"pressing": (0.0, np.inf), "cone": (0.0, np.inf)}
 Knots = NDArray[np.int64]
@@ -101,6 +105,10 @@ class Declaration:
             )
         if model.motors:
             self._declare_coupling(model.motors)
+        self.rows: dict[str, Rows] = {}
+        if model.attachment is not None:
+            for name, most in (("coordinate", np.inf), ("coordinate_speed", np.inf), ("stuck", JOINT_HOLDING)):
+                self.rows[name] = problem.variable(name, (count, 1), -most, most)
 
     def _declare_coupling(self, motors: int) -> None:
         """Variables of motors that share joints."""
@@ -125,8 +133,13 @@ class Declaration:
             problem.parameter("cone_friction", (1, 1), quantity="friction")
         if structure.model.motors:
             widths |= {"stiffness": 1}
+        if structure.model.attachment is not None:
+            widths |= JOINT_SIZES
         for name, width in widths.items():
             problem.parameter(name, (1, width))
+        if structure.model.attachment is not None or structure.model.exerted:
+            for name in ("planned_force", "planned_torque"):
+                problem.parameter(name, (count, 3))
         problem.parameter("step", (count - 1, 1))
         for name, width in (("palm_position", 3), ("palm_quaternion", 4), ("wanted_pose", 6)):
             problem.parameter(name, (count, width))

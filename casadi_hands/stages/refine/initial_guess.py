@@ -7,6 +7,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from casadi_hands.problem.attachment import MOVING, dry_friction
 from casadi_hands.problem.model import Model
 from casadi_hands.statics.grasp import grasp_map
 
@@ -33,9 +34,37 @@ def rates_and_wrenches(model: Model, position: Array, vector: Array) -> tuple[Ar
     spins = np.array([reference.T @ pin.Jexp3(v) @ w for v, w in zip(vector, turn(times, 1), strict=True)])
     spun = CubicSpline(times, spins)(times, 1)
     inertial, inertia = model.units.inertial, model.inertia
-    force = np.einsum("sij,sj->si", to_object, inertial * path(times, 2) - model.gravity)
+    plan = model.scenarios[0]
+    force = np.einsum("sij,sj->si", to_object, inertial * path(times, 2) - model.gravity - plan.force)
     torque = inertial * (np.cross(spins, spins @ inertia.T) + spun @ inertia.T)
+    if model.exerted:
+        torque -= np.einsum("sij,sj->si", to_object, plan.torque)
     return np.hstack([path(times, 1), spins]), np.hstack([force, torque])
+
+
+def along_joint(model: Model, position: Array, vector: Array) -> tuple[dict[str, Array], Array]:
+    """A motion of an attached object on its joint, at rest at both ends, and what contacts must do along it.
+
+    Args:
+        model: the task.
+        position: (S, 3) world, near the joint.
+        vector: (S, 3) rotation vectors from the reference.
+
+    Returns:
+        ``pose`` and ``rate`` (S, 6), ``coordinate``, ``coordinate_speed`` and ``stuck`` (S, 1); and (S, 1) torque in
+        m·g·length, of a slider force in m·g.
+    """
+    joint = model.attachment
+    assert joint is not None
+    coordinate = joint.coordinates(position, vector)
+    path = CubicSpline(model.schedule.samples, coordinate, bc_type="clamped")
+    speed = path(model.schedule.samples, 1)
+    speed[[0, -1]] = 0.0
+    pose, rate = joint.poses(coordinate), joint.rates(coordinate, speed)
+    moved = model.unborne(rates_and_wrenches(model, pose[:, :3], pose[:, 3:])[1].T).T
+    resisted = joint.resistance(coordinate, speed) + dry_friction(joint, speed, MOVING)
+    values = {"pose": pose, "rate": rate, "coordinate": coordinate[:, None], "coordinate_speed": speed[:, None]}
+    return {**values, "stuck": np.zeros((len(pose), 1))}, np.asarray(moved - resisted[:, None])
 
 
 def disturbance_wrenches(model: Model, vector: Array) -> Array:
@@ -51,12 +80,18 @@ def _to_object(model: Model, vector: Array) -> Array:
     return np.array([(pin.exp3(v) @ reference).T for v in vector])
 
 
-def balanced(points: Array, forces: Array, active: NDArray[np.bool_], wrenches: Array) -> Array:
-    """Forces (S, C, 3) nearest to given ones whose active ones make the wrenches (S, 6), as far as contacts can."""
+def balanced(
+    points: Array, forces: Array, active: NDArray[np.bool_], wrenches: Array, twist: Array | None = None
+) -> Array:
+    """Forces (S, C, 3) nearest to given ones whose active ones make the wrenches (S, 6), as far as contacts can.
+
+    Of an attached object, which moves along a ``twist`` (6,), what they do along it, (S, 1).
+    """
     result = np.zeros_like(forces)
     for k, flags in enumerate(active):
         if flags.any():
             grasp, given = grasp_map(points[k, flags]), forces[k, flags].reshape(-1)
+            grasp = grasp if twist is None else twist[None] @ grasp
             # Wrenches that the contacts can hardly make would take forces out of all proportion.
             correction = np.linalg.pinv(grasp, rcond=1e-2) @ (wrenches[k] - grasp @ given)
             result[k, flags] = (given + correction).reshape(-1, 3)

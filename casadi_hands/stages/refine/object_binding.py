@@ -6,24 +6,19 @@ import numpy as np
 
 from casadi_hands.problem.palm_motion import carried_velocity
 from casadi_hands.stages.object_motion.values import GOAL_TOLERANCE
+from casadi_hands.stages.refine import attached, newton_euler
 from casadi_hands.stages.refine import object_kernels as kernels
 from casadi_hands.stages.refine.declaration import FREE, IN_CONE, Declaration
+
+ANSWER = "planned_force", "planned_torque"
 
 
 def bind_physics(of: Declaration) -> None:
     """Newton–Euler from knot to knot, rest at both ends, disturbances, and what keeps the motion smooth."""
+    held = of.structure.model.attachment
     problem, columns, soft = of.problem, len(of.structure.columns), bool(of.structure.model.torsion)
     every, now, later = np.arange(of.knots), np.arange(of.knots - 1), np.arange(1, of.knots)
-    of.bind(
-        now,
-        kernels.physics(),
-        {"defect": (0, 0)},
-        pose=(of.pose.take(now), of.pose.take(later)),
-        rate=(of.rate.take(now), of.rate.take(later)),
-        wrench=(of.wrench.take(now), of.wrench.take(later)),
-        middle_torque=of.middle_torque,
-        **of.at(now, "reference", "step", "gravity", "inertial", "inertia", "inverse"),
-    )
+    _bind_newton_euler(of) if held is None else attached.bind(of)
     twist = {"twist_torque": of.twist_torque} if soft else {}
     kernel = kernels.wrench(columns, soft)
     of.bind(every, kernel, {"sum": (0, 0)}, wrench=of.wrench, point=of.point, force=of.force, **twist)
@@ -31,9 +26,7 @@ def bind_physics(of: Declaration) -> None:
     carried = np.hstack([carried_velocity(of.structure.model), np.zeros((of.knots, 3))])
     rates = [of.rate.plus(-carried).take(inner + k) for k in range(3)]
     problem.bind(kernels.object_jerk(), rate=rates, step=of.steps(inner, inner + 1))
-    ends = np.array([0, of.knots - 1])
-    still = {"pose": of.pose.take(ends), "wrench": of.wrench.take(ends)}
-    of.bind(ends, kernels.equilibrium(), {"sum": (0, 0)}, **still, **of.at(ends, "reference", "gravity"))
+    _bind_rest(of) if held is None else attached.bind_rest(of)
     of.bind(
         now,
         kernels.middle_torque(columns, soft),
@@ -50,15 +43,40 @@ def bind_physics(of: Declaration) -> None:
             problem.parameter(f"external_{kind}", (len(of.disturbed), 3))
         of.bind(
             of.disturbed,
-            kernels.disturbed(columns, soft),
+            kernels.disturbed(columns, soft) if held is None else attached.disturbed(columns, soft),
             {"sum": (0, 0)},
             **{name: rows.take(of.disturbed) for name, rows in twist.items()},
             pose=of.pose.take(of.disturbed),
             wrench=of.wrench.take(of.disturbed),
             point=of.point.take(of.disturbed),
             force=of.force_disturbed,
-            **problem.given("reference", "external_force", "external_torque"),
+            **problem.given("reference", "external_force", "external_torque", *(("freedom",) if held else ())),
         )
+
+
+def _bind_newton_euler(of: Declaration) -> None:
+    """Physics of a free object from knot to knot."""
+    problem, exerting = of.problem, bool(of.structure.model.exerted)
+    now, later, names = np.arange(of.knots - 1), np.arange(1, of.knots), ANSWER if exerting else ()
+    of.bind(
+        now,
+        newton_euler.physics(exerting),
+        {"defect": (0, 0)},
+        pose=(of.pose.take(now), of.pose.take(later)),
+        rate=(of.rate.take(now), of.rate.take(later)),
+        wrench=(of.wrench.take(now), of.wrench.take(later)),
+        middle_torque=of.middle_torque,
+        **{name: (problem[name].take(now), problem[name].take(later)) for name in names},
+        **of.at(now, "reference", "step", "gravity", "inertial", "inertia", "inverse"),
+    )
+
+
+def _bind_rest(of: Declaration) -> None:
+    """A free object at both ends, where it rests."""
+    exerting, ends = bool(of.structure.model.exerted), np.array([0, of.knots - 1])
+    still = {"pose": of.pose.take(ends), "wrench": of.wrench.take(ends)}
+    given = of.at(ends, "reference", "gravity", *(ANSWER if exerting else ()))
+    of.bind(ends, newton_euler.equilibrium(exerting), {"sum": (0, 0)}, **still, **given)
 
 
 def bind_object(of: Declaration) -> None:

@@ -1,4 +1,4 @@
-"""The object's blocks of the refine stage: physics between knots, ground, clearance, drawing, all to be met exactly."""
+"""The object's blocks of the refine stage: its contacts' wrench, disturbances, ground, clearance, drawing, all to be met exactly."""
 
 from __future__ import annotations
 
@@ -6,12 +6,11 @@ from functools import cache
 
 import casadi as ca
 from casadi import SX
-from numpy.polynomial.legendre import leggauss
 
 from casadi_hands.geometry import point_disc_distance
 from casadi_hands.geometry.bodies import Body, surfaces, width_of
 from casadi_hands.geometry.surface import path_between
-from casadi_hands.motion import conjugate, derivative, multiply, rotation_matrix
+from casadi_hands.motion import conjugate, derivative, rotation_matrix
 from casadi_hands.motion.pose import placed
 from casadi_hands.nlp import Constraint, Kernel
 from casadi_hands.stages.refine.torsion import twist_torque
@@ -19,8 +18,6 @@ from casadi_hands.terms import body, contact
 from casadi_hands.terms import constraints as limits
 
 ROUNDING = 1e-6  # lengths, of distances where they vanish
-# Gauss and Legendre's points and weights, for a step from 0 to 1.
-_GAUSS, _GAUSS_WEIGHTS = (leggauss(3)[0] + 1) / 2, leggauss(3)[1] / 2
 
 
 @cache
@@ -58,73 +55,6 @@ def _torque(points: SX, forces: SX) -> SX:
 
 
 @cache
-def physics() -> Kernel:
-    """Newton–Euler from one knot to the next; forces and contact points linear in the object's frame.
-
-    The force is then linear in time and the torque quadratic: both ends and the middle say all of it. Orientation and
-    spin between the knots are those of the quintic that has their values and first two derivatives at both, and
-    accelerations are integrated over these by Gauss: sixth order in the step.
-    """
-    kernel = Kernel("physics")
-    states = [(kernel.variable(f"pose{i}", 6, "pose", i), kernel.variable(f"rate{i}", 6, "rate", i)) for i in range(2)]
-    wrenches = [kernel.variable(f"wrench{i}", 6, "wrench", i) for i in range(2)]
-    middle = kernel.variable("middle_torque", 3)
-    reference, step = kernel.parameter("reference", 4), kernel.parameter("step")
-    gravity, inertial = kernel.parameter("gravity", 3), kernel.parameter("inertial")
-    inertia = ca.reshape(kernel.parameter("inertia", 9), 3, 3)
-    inverse = ca.reshape(kernel.parameter("inverse", 9), 3, 3)
-    (torque0, torque1), change = (wrench[3:] for wrench in wrenches), wrenches[1][3:] - wrenches[0][3:]
-    bend = 2 * (torque0 + torque1) - 4 * middle
-
-    def angular(omega: SX, s: float) -> SX:
-        torque = torque0 + s * change + s * (s - 1) * bend
-        return ca.mtimes(inverse, torque / inertial - ca.cross(omega, ca.mtimes(inertia, omega)))
-
-    def turning(quaternion: SX, omega: SX) -> SX:
-        return multiply(quaternion, ca.vertcat(0, omega)) / 2
-
-    turns, spins = [], []  # value, derivative and second derivative at both knots, by the share of the step
-    for i, (pose, rate) in enumerate(states):
-        (_, quaternion), omega = placed(pose, reference), rate[3:]
-        alpha = step * angular(omega, i)
-        gyration = ca.cross(alpha, ca.mtimes(inertia, omega)) + ca.cross(omega, ca.mtimes(inertia, alpha))
-        jerk = step * ca.mtimes(inverse, (change + (2 * i - 1) * bend) / inertial - gyration)
-        turn = step * turning(quaternion, omega)
-        turns.append((quaternion, turn, step * (turning(turn, omega) + turning(quaternion, alpha))))
-        spins.append((omega, alpha, jerk))
-    moved, sped, turned, spun = SX.zeros(3, 1), SX.zeros(3, 1), turns[0][0], SX.zeros(3, 1)
-    for s, weight in zip(_GAUSS.tolist(), _GAUSS_WEIGHTS.tolist(), strict=True):
-        quaternion, omega = (_quintic(start, end, s) for start, end in (turns, spins))
-        force = (1 - s) * wrenches[0][:3] + s * wrenches[1][:3]
-        acceleration = (ca.mtimes(rotation_matrix(quaternion), force) + gravity) / inertial
-        sped += weight * step * acceleration
-        moved += weight * (1 - s) * step**2 * acceleration
-        turned += weight * step * turning(quaternion, omega)
-        spun += weight * step * angular(omega, s)
-    (before, rate0), (after, rate1) = states
-    kernel.cost(body.KNOT_ACCELERATION, (rate1 - rate0) / step)
-    off = (
-        after[:3] - before[:3] - step * rate0[:3] - moved,
-        2 * multiply(conjugate(turned), turns[1][0])[1:],
-        rate1 - rate0 - ca.vertcat(sped, spun),
-    )
-    kernel.constrain(limits.DEFECT, ca.vertcat(*off))
-    return kernel
-
-
-def _quintic(start: tuple[SX, SX, SX], end: tuple[SX, SX, SX], s: float) -> SX:
-    """At a share s of the step, the polynomial with given value, derivative and second derivative at both ends."""
-    r = 1 - s
-    return (
-        r**3 * (1 + 3 * s + 6 * s**2) * start[0]
-        + s**3 * (1 + 3 * r + 6 * r**2) * end[0]
-        + r**3 * s * (1 + 3 * s) * start[1]
-        - s**3 * r * (1 + 3 * r) * end[1]
-        + (r**3 * s**2 * start[2] + s**3 * r**2 * end[2]) / 2
-    )
-
-
-@cache
 def disturbed(contacts: int, soft: bool) -> Kernel:
     """Second forces at a knot that, with a push from outside and the same torsion, make the wrench of the first."""
     kernel = Kernel("disturbed")
@@ -138,19 +68,6 @@ def disturbed(contacts: int, soft: bool) -> Kernel:
     torque = _torque(points, forces) + twist_torque(kernel, soft)
     kernel.constrain(limits.DISTURBED_WRENCH, ca.vertcat(ca.sum2(forces), torque) + push - total)
     kernel.cost(body.DISTURBED_FORCE, forces)
-    return kernel
-
-
-@cache
-def equilibrium() -> Kernel:
-    """The contacts' wrench that holds the object still at one knot: a motion starts and ends without a jolt."""
-    kernel = Kernel("equilibrium")
-    pose, total = kernel.variable("pose", 6), kernel.variable("wrench", 6)
-    reference, gravity = kernel.parameter("reference", 4), kernel.parameter("gravity", 3)
-    _, quaternion = placed(pose, reference)
-    kernel.constrain(
-        limits.EQUILIBRIUM, ca.vertcat(ca.mtimes(rotation_matrix(quaternion), total[:3]) + gravity, total[3:])
-    )
     return kernel
 
 

@@ -22,7 +22,7 @@ from casadi_hands.problem.model import Model
 from casadi_hands.problem.resampling import shortened
 from casadi_hands.problem.structure import Structure
 from casadi_hands.stages.own_terms import own_weights
-from casadi_hands.stages.refine import coupling
+from casadi_hands.stages.refine import attached, coupling
 from casadi_hands.stages.refine.declaration import Bounds
 from casadi_hands.stages.refine.inter_knot import pass_through
 from casadi_hands.stages.refine.problem import RefineProblem
@@ -247,6 +247,7 @@ class RefineStage:
             solution=solution,
             disturbed=disturbed,
             torsion=torsion,
+            on_joint=attached.result(self.model, values),
             coupling=start.coupling and coupling.result(self.built, values, start.coupling.leaders),
         )
         worst = self._worst(solution)

@@ -16,9 +16,10 @@ from casadi_hands.problem.model import Model
 from casadi_hands.problem.placement import contact_jacobians, contact_spins
 from casadi_hands.stages.object_motion.values import MOST_TURN, tool_path
 from casadi_hands.stages.own_terms import own_values
+from casadi_hands.stages.refine import attached
 from casadi_hands.stages.refine.coupling import start as coupling_start
 from casadi_hands.stages.refine.declaration import HOLDING
-from casadi_hands.stages.refine.initial_guess import balanced, disturbance_wrenches, rates_and_wrenches
+from casadi_hands.stages.refine.initial_guess import along_joint, balanced, disturbance_wrenches, rates_and_wrenches
 from casadi_hands.stages.refine.problem import RefineProblem
 from casadi_hands.stages.refine.settings import SHARP, SPIN_SCALE
 from casadi_hands.stages.refine.sliding import SLIP_SCALE, WHOLE, runs
@@ -133,6 +134,8 @@ class RefineValues:
         most = model.force_limit
         bearing, active = (np.repeat(np.where(f, most, 0.0), 3, axis=1) for f in (self.bearing, self._active))
         upper = {"rate": rate, "force": bearing}
+        if model.attachment is not None:  # whose rates follow from its joint's
+            upper = {"force": bearing, **attached.bounds(model.attachment, count)}
         if model.torsion:
             upper["torsion"] = np.where(self.bearing[:, : len(self.structure.contacts)], most, 0.0)
         if model.sliding:
@@ -147,12 +150,17 @@ class RefineValues:
     def start(self, motion: WholeHand) -> dict[str, Array]:
         """Values of all variables: the motion, with velocities and forces that nearly obey it."""
         count, chosen = self.knots, self.structure.columns
-        rates, wrenches = rates_and_wrenches(self.model, motion.position, motion.vector)
+        joint, twist = self.model.attachment, None
+        if joint is None:
+            rates, wrenches = rates_and_wrenches(self.model, motion.position, motion.vector)
+            moving = {"pose": np.hstack([motion.position, motion.vector]), "rate": rates}
+        else:
+            twist = joint.twist
+            moving, wrenches = along_joint(self.model, motion.position, motion.vector)
         points = motion.point[:, chosen]
-        forces = balanced(points, motion.force[:, chosen], self.bearing, wrenches)
+        forces = balanced(points, motion.force[:, chosen], self.bearing, wrenches, twist)
         values = {
-            "pose": np.hstack([motion.position, motion.vector]),
-            "rate": rates,
+            **moving,
             "point": points.reshape(count, -1),
             "force": forces.reshape(count, -1),
             "wrench": np.hstack([forces.sum(axis=1), np.cross(points, forces).sum(axis=1)]),
@@ -169,8 +177,8 @@ class RefineValues:
         at, pushing, twisting = ((a[1:] + a[:-1]) / 2 for a in (points, forces, twist))
         values["middle_torque"] = np.cross(at, pushing).sum(axis=1) + twisting
         if len(k := self.disturbed):
-            needed = wrenches[k] - disturbance_wrenches(self.model, motion.vector)[k]
-            disturbed = balanced(points[k], forces[k], self._active[k], needed)
+            pushed = self.model.unborne(disturbance_wrenches(self.model, motion.vector)[k].T).T
+            disturbed = balanced(points[k], forces[k], self._active[k], wrenches[k] - pushed, twist)
             values["force_disturbed"] = disturbed.reshape(len(k), -1)
         for c, finger, angles in zip(self.structure.contacts, motion.fingers, motion.angles, strict=True):
             values[f"angles{c}"] = angles
@@ -229,6 +237,10 @@ class RefineValues:
         values |= self.proximity.idle
         if model.servo:
             values["servo_radius"] = model.servo
+        if model.attachment is not None:
+            values |= attached.parameters(model.attachment)
+        if model.attachment is not None or model.exerted:
+            values |= {"planned_force": model.scenarios[0].force, "planned_torque": model.scenarios[0].torque}
         if model.torsion:
             values |= {"torsion_radius": model.torsion, "sliding_friction": model.friction}
             values["spin_scale"] = self._spin_scale

@@ -36,6 +36,9 @@ _SHAPES: dict[str, tuple[str | int, ...]] = {
     "contact_force_disturbed": ("S", "C", 3),
     "external_force_disturbed": ("S", 3),
     "external_torque_disturbed": ("S", 3),
+    "attachment_position": ("S",),
+    "attachment_velocity": ("S",),
+    "attachment_friction": ("S",),
 }
 _ASKED = frozenset(name for name, item in Motion.__dataclass_fields__.items() if item.default is not None)
 

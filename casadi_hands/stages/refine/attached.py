@@ -1,0 +1,219 @@
+"""An object on a joint in the refine stage: its pose is the joint's, and physics is asked along the one coordinate.
+
+The joint neither moves in the world nor in the object, so that the contacts' part of what moves it along is a constant
+row, the twist, times their wrench in the object's frame. Dry friction acts against the motion; where it rests up to
+``JOINT_HOLDING`` of it does what balance asks. Between knots the coordinate is the cubic that has its values and speeds at
+both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+from numpy.typing import ArrayLike, NDArray
+
+from casadi_hands.motion import conjugate, exponential, multiply, rotation_matrix
+from casadi_hands.nlp import Kernel
+from casadi_hands.problem.attachment import MOVING, Attachment
+from casadi_hands.problem.hand_motion import OnJoint
+from casadi_hands.problem.model import Model
+from casadi_hands.stages.refine.declaration import JOINT_HOLDING, Declaration
+from casadi_hands.stages.refine.newton_euler import GAUSS, GAUSS_WEIGHTS
+from casadi_hands.stages.refine.torsion import twist_torque
+from casadi_hands.terms import body
+from casadi_hands.terms import constraints as limits
+from casadi_hands.terms.contact import saturated
+
+Array = NDArray[np.float64]
+_JOINT = (("turn_axis", 3), ("joint_axis", 3), ("pivot", 3), ("joint_start", 3), ("advance", 1), ("freedom", 6))
+_LOADS = (("joint_mass", 1), ("joint_friction", 1), ("joint_stiffness", 1), ("joint_damping", 1))
+_WORLD = (("reference", 4), ("gravity", 3))
+
+
+def _given(kernel: Kernel, names: tuple[tuple[str, int], ...]) -> dict[str, SX]:
+    return {name: kernel.parameter(name, size) for name, size in names}
+
+
+@cache
+def on_joint() -> Kernel:
+    """Pose and velocities at a knot are those of the joint at its coordinate and speed, (12,)."""
+    kernel = Kernel("on_joint")
+    pose, rate = kernel.variable("pose", 6), kernel.variable("rate", 6)
+    coordinate, speed = kernel.variable("coordinate", 1), kernel.variable("coordinate_speed", 1)
+    joint, reference = _given(kernel, _JOINT), kernel.parameter("reference", 4)
+    vector = coordinate * joint["turn_axis"]
+    turned = exponential(vector)
+    lever = ca.mtimes(rotation_matrix(turned), joint["joint_start"] - joint["pivot"])
+    position = joint["pivot"] + lever + coordinate * joint["advance"] * joint["joint_axis"]
+    velocity = ca.mtimes(rotation_matrix(multiply(turned, reference)), joint["freedom"][:3])
+    due = ca.vertcat(position, vector, speed * velocity, speed * joint["freedom"][3:])
+    kernel.constrain(limits.ON_JOINT, ca.vertcat(pose, rate) - due)
+    return kernel
+
+
+def _drag(given: dict[str, SX], speed: SX, stuck: SX) -> SX:
+    """Dry friction along the coordinate at a speed."""
+    fully = saturated(speed, SX(MOVING))
+    return -given["joint_friction"] * (fully - (1 - fully**2) * stuck)
+
+
+def _outside(given: dict[str, SX], coordinate: SX, force: SX, torque: SX) -> SX:
+    """What weight, and a force and a torque (3,) in the world, do along the coordinate, its spring's force added."""
+    to_object = rotation_matrix(conjugate(multiply(exponential(coordinate * given["turn_axis"]), given["reference"])))
+    free, pull = given["freedom"], given["gravity"] + force
+    work = ca.dot(free[:3], ca.mtimes(to_object, pull)) + ca.dot(free[3:], ca.mtimes(to_object, torque))
+    return work - given["joint_stiffness"] * coordinate
+
+
+@cache
+def physics() -> Kernel:
+    """Newton and Euler along the coordinate from one knot to the next, as `newton_euler.physics` has them."""
+    kernel = Kernel("physics")
+    q, speeds, stuck = (
+        [kernel.variable(f"{name}{i}", 1, name, i) for i in range(2)]
+        for name in ("coordinate", "coordinate_speed", "stuck")
+    )
+    rates, wrenches = ([kernel.variable(f"{name}{i}", 6, name, i) for i in range(2)] for name in ("rate", "wrench"))
+    middle, step = kernel.variable("middle_torque", 3), kernel.parameter("step")
+    given = _given(kernel, (("turn_axis", 3), ("freedom", 6), *_LOADS, *_WORLD, ("inertial", 1)))
+    forces, torques = (
+        [kernel.parameter(f"{name}{i}", 3, name, i) for i in range(2)] for name in ("planned_force", "planned_torque")
+    )
+    free, inertia = given["freedom"], given["inertial"] * given["joint_mass"]
+    bend = 2 * (wrenches[0][3:] + wrenches[1][3:]) - 4 * middle
+    drags = [_drag(given, speed, held) for speed, held in zip(speeds, stuck, strict=True)]
+
+    def blend(ends: list[SX], s: float) -> SX:
+        return (1 - s) * ends[0] + s * ends[1]
+
+    sped, moved, mean = SX(0), SX(0), SX(0)
+    for s, weight in zip(GAUSS.tolist(), GAUSS_WEIGHTS.tolist(), strict=True):
+        launched, arriving = step * s * (1 - s) ** 2 * speeds[0], step * s**2 * (s - 1) * speeds[1]
+        there = q[0] + s**2 * (3 - 2 * s) * (q[1] - q[0]) + launched + arriving
+        pushed = ca.dot(free, blend(wrenches, s)) + s * (s - 1) * ca.dot(free[3:], bend) + blend(drags, s)
+        acceleration = (pushed + _outside(given, there, blend(forces, s), blend(torques, s))) / inertia
+        sped += weight * step * acceleration
+        moved += weight * (1 - s) * step**2 * acceleration
+        mean += weight * there
+    damped = given["joint_damping"] / inertia
+    sped -= damped * (q[1] - q[0])
+    moved -= damped * step * (mean - q[0])
+    kernel.cost(body.KNOT_ACCELERATION, (rates[1] - rates[0]) / step)
+    defect = (q[1] - q[0] - step * speeds[0] - moved, speeds[1] - speeds[0] - sped)
+    kernel.constrain(limits.DEFECT, ca.vertcat(*defect))
+    return kernel
+
+
+@cache
+def equilibrium() -> Kernel:
+    """What holds the object still at one knot along its coordinate, friction helping as far as it may, (1,)."""
+    kernel = Kernel("equilibrium")
+    coordinate, total = kernel.variable("coordinate", 1), kernel.variable("wrench", 6)
+    stuck = kernel.variable("stuck", 1)
+    given = _given(kernel, (("turn_axis", 3), ("freedom", 6), *_LOADS[1:3], *_WORLD))
+    force, torque = kernel.parameter("planned_force", 3), kernel.parameter("planned_torque", 3)
+    outside = _outside(given, coordinate, force, torque) + _drag(given, SX(0), stuck)
+    kernel.constrain(limits.EQUILIBRIUM, ca.dot(given["freedom"], total) + outside)
+    return kernel
+
+
+@cache
+def disturbed(contacts: int, soft: bool) -> Kernel:
+    """Second forces at a knot that, with a push from outside and the same torsion, do along the joint what the first do."""
+    kernel = Kernel("disturbed")
+    pose, total = kernel.variable("pose", 6), kernel.variable("wrench", 6)
+    points, forces = (
+        ca.reshape(kernel.variable(name, 3 * contacts), 3, contacts) for name in ("point", "force")
+    )
+    names = (("reference", 4), ("external_force", 3), ("external_torque", 3), ("freedom", 6))
+    reference, push, turn, free = (kernel.parameter(n, k) for n, k in names)
+    to_object = rotation_matrix(conjugate(multiply(exponential(pose[3:]), reference)))
+    torque = sum((ca.cross(points[:, i], forces[:, i]) for i in range(contacts)), SX.zeros(3, 1))
+    made = ca.vertcat(ca.sum2(forces), torque + twist_torque(kernel, soft))
+    pushed = ca.vertcat(ca.mtimes(to_object, push), ca.mtimes(to_object, turn))
+    kernel.constrain(limits.DISTURBED_WRENCH, ca.dot(free, made + pushed - total))
+    kernel.cost(body.DISTURBED_FORCE, forces)
+    return kernel
+
+
+def bind(of: Declaration) -> None:
+    """Bind the object to its joint, and physics along it."""
+    problem, now, later = of.problem, np.arange(of.knots - 1), np.arange(1, of.knots)
+    every, rows = np.arange(of.knots), of.rows
+    joint = {name: problem[name] for name, _ in _JOINT}
+    loads = {name: problem[name] for name, _ in (*_LOADS, ("turn_axis", 3), ("freedom", 6))}
+    of.bind(
+        every,
+        on_joint(),
+        {"on_joint": (0, 0)},
+        pose=of.pose,
+        rate=of.rate,
+        coordinate=rows["coordinate"],
+        coordinate_speed=rows["coordinate_speed"],
+        reference=problem["reference"],
+        **joint,
+    )
+    both = {"rate": of.rate, "wrench": of.wrench, **rows}
+    of.bind(
+        now,
+        physics(),
+        {"defect": (0, 0)},
+        **{name: (each.take(now), each.take(later)) for name, each in both.items()},
+        middle_torque=of.middle_torque,
+        **{name: (problem[name].take(now), problem[name].take(later)) for name in ("planned_force", "planned_torque")},
+        **loads,
+        **of.at(now, "reference", "step", "gravity", "inertial"),
+    )
+
+
+def bind_rest(of: Declaration) -> None:
+    """Bind that the object rests at both ends without a jolt."""
+    problem, rows, ends = of.problem, of.rows, np.array([0, of.knots - 1])
+    still = {name: problem[name] for name in ("turn_axis", "freedom", "joint_friction", "joint_stiffness")}
+    of.bind(
+        ends,
+        equilibrium(),
+        {"sum": (0, 0)},
+        coordinate=rows["coordinate"].take(ends),
+        stuck=rows["stuck"].take(ends),
+        wrench=of.wrench.take(ends),
+        **still,
+        **of.at(ends, "reference", "gravity", "planned_force", "planned_torque"),
+    )
+
+
+def parameters(joint: Attachment) -> dict[str, ArrayLike]:
+    """Values of the joint's parameters."""
+    return {
+        "turn_axis": joint.turn_axis,
+        "joint_axis": joint.world_axis,
+        "pivot": joint.pivot,
+        "joint_start": joint.start,
+        "advance": joint.advance,
+        "freedom": joint.twist,
+        "joint_mass": joint.mass,
+        "joint_friction": joint.friction,
+        "joint_stiffness": joint.stiffness,
+        "joint_damping": joint.damping,
+    }
+
+
+def bounds(joint: Attachment, knots: int) -> dict[str, Array]:
+    """Upper bounds of the joint's variables, the lower ones their negatives: rest at both ends."""
+    speed = np.full((knots, 1), np.inf)
+    speed[[0, -1]] = 0.0
+    return {"coordinate_speed": speed, "stuck": np.full((knots, 1), JOINT_HOLDING if joint.friction else 0.0)}
+
+
+def result(model: Model, values: Mapping[str, Array]) -> OnJoint | None:
+    """The joint's coordinate, speed and friction of a solve; None of a free object."""
+    joint = model.attachment
+    if joint is None:
+        return None
+    coordinate, speed, stuck = (values[name][:, 0] for name in ("coordinate", "coordinate_speed", "stuck"))
+    fully = speed / np.sqrt(speed**2 + MOVING**2)
+    return OnJoint(coordinate, speed, -joint.friction * (fully - (1 - fully**2) * stuck))
