@@ -84,6 +84,8 @@ def holdings(model: Model, floating: Floating, friction: float | None = None) ->
 
 def firmest(model: Model) -> float:
     """The normal force, m·g, beyond which holding the object is hard, beside what the task's disturbances ask for."""
+    if model.attachment is not None or model.exerted:  # what is to be moved or pressed has little to do with its weight
+        return model.force_limit
     still, pushed = (
         0.0 if load is None else load.least
         for load in (hardest_load(each, 0.0) for each in (replace(model, scenarios=model.scenarios[:1]), model))

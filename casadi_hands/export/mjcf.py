@@ -1,4 +1,4 @@
-"""The whole scene as MJCF for MuJoCo: hand on its base, object free, ground, one position actuator a motor.
+"""The whole scene as MJCF for MuJoCo: hand on its base, object, ground, one position actuator a motor.
 
 Choices a reader of the file should know:
 
@@ -15,6 +15,8 @@ Choices a reader of the file should know:
 - **Shared motors.** Where motors share joints, each is a hinge of its own, ``motor{m}``, with a stiff position
   actuator. A fixed tendon pulls at every joint, by the joint's spring and damper, to where the motors turn it, and as
   hard at the motors, by virtual work.
+- **Object.** It is free, or hangs on its joint, ``object``, with friction (``frictionloss``), spring and damper; of a
+  thread an equation keeps the pitch between that and a second one, ``object_along``.
 - **Start.** Bodies stand as at the motion's first sample, whose joint angles are the joints' reference: what loads the
   scene and resets nothing finds no finger in the object.
 - **Collisions.** Neighbours in a chain, the palm and first links among them, do not collide; all else does.
@@ -30,6 +32,7 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from casadi_hands.export.attached import add_joints, couple, object_coordinates
 from casadi_hands.export.commands import commanded
 from casadi_hands.export.markup import (
     GROUND_COLOR,
@@ -87,6 +90,7 @@ def scene_mjcf(task: Task, hand: Hand, motion: Motion) -> str:
     if moves:
         weld = {"body1": "palm_target", "body2": "palm", "solref": number(2.5 * _TIME_STEP) + " 1"}
         SubElement(SubElement(root, "equality"), "weld", weld)
+    couple(root, task.object.attached)
     if hand.drive is None:
         _add_actuators(root, hand.joint_names, motors, hand.effort)
     else:
@@ -163,11 +167,16 @@ def _add_ground(world: Element, ground: Ground, spacing: float) -> None:
 
 
 def _add_object(world: Element, task: Task, motion: Motion) -> None:
-    """Add the free object at its first pose; its friction takes precedence over the hand's."""
-    start = {"pos": numbers(motion.object_position[0]), "quat": numbers(motion.object_orientation[0])}
+    """Add the object, free or on its joint, at its first pose; its friction takes precedence over the hand's."""
+    start, item = (
+        {"pos": numbers(motion.object_position[0]), "quat": numbers(motion.object_orientation[0])},
+        task.object,
+    )
     body = SubElement(world, "body", start, name="object")
-    SubElement(body, "freejoint", name="object")
-    item = task.object
+    if item.attached is None:
+        SubElement(body, "freejoint", name="object")
+    else:
+        add_joints(body, item.attached, motion)
     add_inertial(body, Inertial(item.mass, np.asarray(item.center_of_mass), np.asarray(item.inertia)))
     for name, solid in object_solids(task).items():
         geom = {"name": name, "priority": "1", "friction": _friction(task)}
@@ -269,10 +278,9 @@ def _add_keyframes(root: Element, task: Task, motion: Motion, moves: bool) -> No
     for name, time in moments.items():
         k = int(np.argmin(np.abs(motion.time - time)))
         base = (*motion.base_position[k], *motion.base_orientation[k]) if moves else ()
-        item = (*motion.object_position[k], *motion.object_orientation[k])
         key = {"name": name, "time": number(motion.time[k])}
         shared = () if motion.motor_positions is None else motion.motor_positions[k]
-        key["qpos"] = numbers((*base, *motion.joint_angles[k], *item, *shared))
+        key["qpos"] = numbers((*base, *motion.joint_angles[k], *object_coordinates(task, motion, k), *shared))
         key["ctrl"] = numbers(motion.joint_commands[k] if motion.motor_positions is None else shared)
         if moves:
             key["mpos"], key["mquat"] = numbers(base[:3]), numbers(base[3:])

@@ -121,9 +121,8 @@ def shortened(model: Model, homotopy: float) -> Model:
     """
     if model.attachment is not None:
         scaled = model.attachment.towards(homotopy)
-        poses = scaled.poses(scaled.goals)
-        goals = {"goal_positions": poses[:, :3], "goal_vectors": poses[:, 3:]}
-        return replace(model, attachment=scaled, regrasp=None, **goals)
+        at = scaled.poses(scaled.goals)
+        return replace(model, attachment=scaled, goal_positions=at[:, :3], goal_vectors=at[:, 3:], regrasp=None)
     seen = goals_seen_from_palm(model)
     goals = carried_by_palm(model, seen[0] + homotopy * (seen - seen[0]), model.schedule.goal_samples)
     return replace(model, goal_positions=goals[:, :3], goal_vectors=goals[:, 3:], regrasp=None)

@@ -20,9 +20,9 @@ from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.loads import USUAL_FORCE, usual_force_limit
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.motion import Motion
+from casadi_hands.problem.outside import attached, attachment_of, exerted_of, scenarios_of
 from casadi_hands.problem.palm_path import PalmPath
 from casadi_hands.problem.placement import object_rotation, torques_in_all
-from casadi_hands.problem.outside import attached, attachment_of, exerted_of, scenarios_of
 from casadi_hands.problem.units import STANDARD_GRAVITY, Units, round_off
 from casadi_hands.task import Task
 

@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from casadi_hands.task.on_joint import joint_problems
 from casadi_hands.task.obstacles import depth_below, depth_in_palm, palm_depth_below
+from casadi_hands.task.on_joint import joint_problems
 from casadi_hands.task.problem import Problem
 from casadi_hands.task.region import Region
 from casadi_hands.task.task import Task
@@ -97,7 +97,9 @@ def _attached(task: Task) -> Iterator[Problem]:
     quick = float(np.sqrt(joint.stiffness / inertia))
     if quick > _QUICKEST:
         given = f"{joint.stiffness:g}, with which the object swings at {quick:.3g} rad/s"
-        allowed = f"at most {inertia * _QUICKEST**2:.3g}: {_QUICKEST:g} rad/s; is the object's mass or inertia too small?"
+        allowed = (
+            f"at most {inertia * _QUICKEST**2:.3g}: {_QUICKEST:g} rad/s; is the object's mass or inertia too small?"
+        )
         yield Problem((*path, held.kind, "stiffness"), given, allowed)
     yield from joint_problems(body, task.motion, task.goal_turns())
 

@@ -53,6 +53,10 @@ class Limits(Section):
         default=0.15,
         description="Share by which the tangential force of a contact that slides is off its cone against the slip.",
     )
+    attachment_shortfall: NonNegative = Field(
+        default=0.15,
+        description="Share by which the friction of an attached object's joint is off all of it against the motion.",
+    )
     unsupplied_force: NonNegative = Field(
         default=0.02, description="Contact force that the joints cannot supply actively, over weight."
     )

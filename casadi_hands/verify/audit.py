@@ -15,6 +15,7 @@ from casadi_hands.task import load_task
 from casadi_hands.verify.checks.certificate import certificate_problems
 from casadi_hands.verify.checks.structure import structure_problems
 from casadi_hands.verify.checks.trust import limit_notes
+from casadi_hands.verify.figures.attached import attachment_figures, joint_residual, object_shots
 from casadi_hands.verify.figures.clearance import joint_figure, penetration_figure, speed_figure
 from casadi_hands.verify.figures.contact import (
     friction_figures,
@@ -25,13 +26,14 @@ from casadi_hands.verify.figures.contact import (
 )
 from casadi_hands.verify.figures.coupling import coupling_figures, motor_speed_figure
 from casadi_hands.verify.figures.disturbances import disturbed_figures
-from casadi_hands.verify.figures.dynamics import Shots, between_residual, sample_residual, shoot
+from casadi_hands.verify.figures.dynamics import Shots, between_residual, sample_residual
 from casadi_hands.verify.figures.goals import goal_figures, rest_figure
 from casadi_hands.verify.figures.sliding import sliding_figure
 from casadi_hands.verify.figures.stiffness import stability_figures
 from casadi_hands.verify.figures.structure import structure_figures
 from casadi_hands.verify.figures.torsion import torsion_figures
 from casadi_hands.verify.figures.wrench import disturbance_figure, torque_figure, unsupplied_figure
+from casadi_hands.verify.held import held
 from casadi_hands.verify.reading.folder import Folder, read_folder
 from casadi_hands.verify.replays.series import TOGETHER, run_replays
 from casadi_hands.verify.report import Audit, Figure
@@ -82,7 +84,8 @@ def audit_files(directory: str | Path, task: str | Path | None = None) -> Audit:
         TaskError: ``task.yaml`` is not a task.
     """
     folder = read_folder(directory, task)
-    shots, placed = shoot(folder), sample_placements(folder)
+    shots, placed = object_shots(folder), sample_placements(folder)
+    joint = held(folder)
     path = build_trajectory(folder, shots)
     problems = structure_problems(folder, path)
     figures = [
@@ -91,6 +94,7 @@ def audit_files(directory: str | Path, task: str | Path | None = None) -> Audit:
         rest_figure(folder, shots),
         *residual_figures(folder, shots),
         *disturbed_figures(folder),
+        *(() if joint is None else attachment_figures(folder, joint)),
         *friction_figures(folder, placed),
         *torsion_figures(folder, placed, path),
         sliding_figure(folder, placed, path),
@@ -114,7 +118,8 @@ def audit_files(directory: str | Path, task: str | Path | None = None) -> Audit:
 def residual_figures(folder: Folder, shots: Shots) -> list[Figure]:
     """Return the Newton-Euler residual at the samples and between them, over the weight (torque: times l)."""
     limits, time = folder.task.limits, folder.motion.time
-    force, torque = sample_residual(folder, shots)
+    joint = held(folder)
+    force, torque = sample_residual(folder, shots) if joint is None else joint_residual(folder, joint)
     kind, values = max((("force", force), ("torque", torque)), key=lambda item: float(np.max(item[1])))
     k = int(np.argmax(values))
     words = f"a {kind} of {{value}} that nothing exerts moves the object at {time[k + 1]:.3g} s"

@@ -2,8 +2,8 @@
 
 The joint neither moves in the world nor in the object, so that the contacts' part of what moves it along is a constant
 row, the twist, times their wrench in the object's frame. Dry friction acts against the motion; where it rests up to
-``JOINT_HOLDING`` of it does what balance asks. Between knots the coordinate is the cubic that has its values and speeds at
-both.
+``JOINT_HOLDING`` of it does what balance asks. Between knots the coordinate is the cubic that has its values and
+speeds at both.
 """
 
 from __future__ import annotations
@@ -123,12 +123,10 @@ def equilibrium() -> Kernel:
 
 @cache
 def disturbed(contacts: int, soft: bool) -> Kernel:
-    """Second forces at a knot that, with a push from outside and the same torsion, do along the joint what the first do."""
+    """Second forces at a knot that, with a push and the same torsion, do along the joint what the first do."""
     kernel = Kernel("disturbed")
     pose, total = kernel.variable("pose", 6), kernel.variable("wrench", 6)
-    points, forces = (
-        ca.reshape(kernel.variable(name, 3 * contacts), 3, contacts) for name in ("point", "force")
-    )
+    points, forces = (ca.reshape(kernel.variable(name, 3 * contacts), 3, contacts) for name in ("point", "force"))
     names = (("reference", 4), ("external_force", 3), ("external_torque", 3), ("freedom", 6))
     reference, push, turn, free = (kernel.parameter(n, k) for n, k in names)
     to_object = rotation_matrix(conjugate(multiply(exponential(pose[3:]), reference)))
@@ -186,9 +184,15 @@ def bind_rest(of: Declaration) -> None:
     )
 
 
-def parameters(joint: Attachment) -> dict[str, ArrayLike]:
-    """Values of the joint's parameters."""
-    return {
+def parameters(model: Model) -> dict[str, ArrayLike]:
+    """Values of the parameters of the joint, if any, and of the world's answer to what is exerted on it."""
+    joint, plan = model.attachment, model.scenarios[0]
+    if joint is None and not model.exerted:
+        return {}
+    answer: dict[str, ArrayLike] = {"planned_force": plan.force, "planned_torque": plan.torque}
+    if joint is None:
+        return answer
+    return answer | {
         "turn_axis": joint.turn_axis,
         "joint_axis": joint.world_axis,
         "pivot": joint.pivot,

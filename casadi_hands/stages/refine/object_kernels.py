@@ -1,4 +1,4 @@
-"""The object's blocks of the refine stage: its contacts' wrench, disturbances, ground, clearance, drawing, all to be met exactly."""
+"""The object's blocks of the refine stage: wrench of contacts, ground, clearance, drawing, all met exactly."""
 
 from __future__ import annotations
 

@@ -237,10 +237,7 @@ class RefineValues:
         values |= self.proximity.idle
         if model.servo:
             values["servo_radius"] = model.servo
-        if model.attachment is not None:
-            values |= attached.parameters(model.attachment)
-        if model.attachment is not None or model.exerted:
-            values |= {"planned_force": model.scenarios[0].force, "planned_torque": model.scenarios[0].torque}
+        values |= attached.parameters(model)
         if model.torsion:
             values |= {"torsion_radius": model.torsion, "sliding_friction": model.friction}
             values["spin_scale"] = self._spin_scale

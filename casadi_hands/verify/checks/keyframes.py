@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from casadi_hands.verify.held import course, held
 from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.reading.scene_file import Scene
 
@@ -46,6 +47,10 @@ def _coordinates(folder: Folder, scene: Scene, k: int) -> np.ndarray:
     for name, body in scene.bodies.items():
         if body.free and name == "palm":
             parts.append(np.concatenate([motion.base_position[k], motion.base_orientation[k]]))
+        elif name == "object" and (joint := held(folder)) is not None:
+            turned = course(folder, joint).position[k]
+            scale = {"object_along": joint.advance, "object": 1.0}
+            parts.append(np.array([scale.get(mount.name, np.nan) * turned for mount in body.mounts]))
         elif body.free:
             parts.append(np.concatenate([motion.object_position[k], motion.object_orientation[k]]))
         hinges = [hinge.name for hinge in body.hinges]

@@ -9,6 +9,7 @@ from casadi_hands.verify.bodies import Body
 from casadi_hands.verify.checks.drive import scene_drive_problems
 from casadi_hands.verify.checks.keyframes import keyframe_problems
 from casadi_hands.verify.checks.motors import damping_problem, rotor_problems
+from casadi_hands.verify.checks.mount import mount_problems
 from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.reading.scene_file import Scene, SceneBody
 from casadi_hands.verify.reading.stored import same
@@ -30,6 +31,7 @@ def scene_problems(folder: Folder) -> list[str]:
         *_world_problems(folder, scene),
         *_body_problems(folder, scene),
         *_hold_problems(folder, scene),
+        *mount_problems(folder, scene),
         *rotor_problems(folder, scene),
         *(
             _servo_problems(folder, scene)
@@ -112,8 +114,11 @@ def _body_problems(folder: Folder, scene: Scene) -> list[str]:
             problems.append(f"the weight of {who} is taken off it (gravcomp)")
         if name in due:
             problems += _solid_problems(folder, who, body, due[name])
-        if body.mocap != (name == "palm_target") or body.free != (name == "object" or (name == "palm" and moves)):
-            problems.append(f"{who} is not {'free' if name == 'object' else 'held'} as the motion has it")
+        loose = folder.task.object.attached is None
+        if body.mocap != (name == "palm_target") or body.free != (
+            (name == "object" and loose) or (name == "palm" and moves)
+        ):
+            problems.append(f"{who} is not {'free' if name == 'object' and loose else 'held'} as the motion has it")
         if joint is None:
             problems += [f"{who} turns on joint {hinge.name}, which is in no other file" for hinge in body.hinges]
             continue

@@ -13,6 +13,7 @@ from casadi_hands.verify.checks.servos import servo_problems
 from casadi_hands.verify.checks.table import table_problems
 from casadi_hands.verify.checks.trust import task_problems
 from casadi_hands.verify.figures.disturbances import external_problems
+from casadi_hands.verify.held import joint_problems
 from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.trajectory import Trajectory
 
@@ -30,6 +31,7 @@ def structure_problems(folder: Folder, path: Trajectory) -> list[str]:
         *folder.strange,
         *motion_problems(folder),
         *external_problems(folder),
+        *joint_problems(folder),
         *object_problems(folder),
         *hand_problems(folder),
         *hand_task_problems(folder, path),

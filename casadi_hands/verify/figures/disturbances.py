@@ -7,12 +7,14 @@ its middle. A sample within `NEAR` of its time may have it too, because samples 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 
 from casadi_hands.task.motion import Perturbation
+from casadi_hands.verify.figures.attached import along_world
 from casadi_hands.verify.figures.dynamics import object_rotation
+from casadi_hands.verify.held import held
 from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.report import Figure
 
@@ -24,6 +26,9 @@ def external_problems(folder: Folder) -> list[str]:
     """Return where the motion has not the task's forces and torques, or has others, a sentence each."""
     motion, pushes = folder.motion, folder.task.perturbations
     plain = (motion.external_force, motion.external_torque)
+    due = exerted(folder)
+    # What differs from the world's answer by rounding is that.
+    plain = (_beside(folder, plain[0], due[0], 1.0), _beside(folder, plain[1], due[1], folder.length))
     helped = np.any(np.hstack(plain) != 0.0)
     disturbed = (motion.external_force_disturbed, motion.external_torque_disturbed)
     given = [part is not None for part in (motion.contact_force_disturbed, *disturbed)]
@@ -36,13 +41,37 @@ def external_problems(folder: Folder) -> list[str]:
     if all(given):
         assert disturbed[0] is not None
         assert disturbed[1] is not None
-        problems += _different(folder, disturbed[0], disturbed[1], "external", "_disturbed")
-        problems += _unexplained(folder, disturbed[0], disturbed[1])
+        force = _beside(folder, disturbed[0], due[0], 1.0)
+        torque = _beside(folder, disturbed[1], due[1], folder.length)
+        problems += _different(folder, force, torque, "external", "_disturbed")
+        problems += _unexplained(folder, force, torque)
     elif pushes and not helped and not folder.legacy:
         problems.append(
             "contact_force_disturbed: missing, so nothing shows that the grasp stands the task's perturbations"
         )
     return problems
+
+
+def exerted(folder: Folder) -> tuple[np.ndarray, np.ndarray]:
+    """Return force and torque (S, 3), world, with which the world answers what the task has the object exert.
+
+    It is all there from the goal before to the goal that states it, and grows and falls within the task's time step
+    outside.
+    """
+    time, step = folder.motion.time, folder.task.time_step
+    force, torque = np.zeros((len(time), 3)), np.zeros((len(time), 3))
+    for before, goal in pairwise(folder.task.motion):
+        if goal.exert is not None:
+            share = np.interp(time, [before.at - step, before.at, goal.at, goal.at + step], [0.0, 1.0, 1.0, 0.0])
+            force -= np.outer(share, goal.exert.force)
+            torque -= np.outer(share, goal.exert.torque)
+    return force, torque
+
+
+def _beside(folder: Folder, values: np.ndarray, due: np.ndarray, lever: float) -> np.ndarray:
+    """Return what a force or torque (S, 3) is beside what is due, which may differ by rounding."""
+    rest = values - due
+    return np.where(np.abs(rest) <= 1e-9 * (np.abs(due).max() + folder.weight * lever * due.any()), 0.0, rest)
 
 
 def _different(folder: Folder, force: np.ndarray, torque: np.ndarray, name: str, suffix: str = "") -> list[str]:
@@ -115,6 +144,11 @@ def disturbed_figures(folder: Folder) -> list[Figure]:
     turning = np.cross(arms, more).sum(axis=1) + torque - motion.external_torque
     left = np.linalg.norm(more.sum(axis=1) + force - motion.external_force, axis=1) / folder.weight
     spin = np.linalg.norm(turning, axis=1) / (folder.weight * folder.length)
+    joint = held(folder)
+    if joint is not None:  # which bears all but what it lets go
+        pulled = more.sum(axis=1) + force - motion.external_force
+        along = np.abs(np.sum(np.hstack([pulled, turning]) * along_world(folder, joint), axis=1)) / joint.unit(folder)
+        left, spin = (0.0 * along, along) if joint.turns else (along, 0.0 * along)
     kind, values = max((("force", left), ("torque", spin)), key=lambda item: float(item[1].max()))
     k = int(np.argmax(values))
     words = f"a {kind} of {{value}} of the task's perturbations is borne by nothing at {motion.time[k]:.3g} s"

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from casadi_hands.verify.held import held
 from casadi_hands.verify.reading.folder import Folder
 
 AT_REST = 1e-4
@@ -216,10 +217,11 @@ def between_residual(folder: Folder) -> np.ndarray:
     What the same forces turn more or less there is what the file leaves unsaid between its samples.
     """
     loads = read_loads(folder)
-    worst = np.zeros(len(loads.time))
+    worst, joint = np.zeros(len(loads.time)), held(folder)
     for fraction in (0.25, 0.5, 0.75):
         force, chord = _blend(loads.force, fraction), _blend(loads.point, fraction)
         surface = np.array([[folder.object.project(point) for point in row] for row in chord])
-        torque = np.linalg.norm(np.cross(surface - chord, force).sum(axis=1), axis=1)
+        more = np.cross(surface - chord, force).sum(axis=1)
+        torque = np.linalg.norm(more, axis=1) if joint is None else np.abs(more @ joint.twist[3:])
         worst = np.maximum(worst, torque / (folder.weight * folder.length))
     return worst

@@ -22,7 +22,9 @@ from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.verify.figures.closest import closest_to_capsule, level_directions, lowest_points
+from casadi_hands.verify.figures.mount import Mount
 from casadi_hands.verify.figures.torsion import most_torsion, tip_radius
+from casadi_hands.verify.held import held
 from casadi_hands.verify.reading.folder import Folder
 
 STEP = 2e-3
@@ -79,6 +81,8 @@ class Stability:
         turn = palm * Rotation.from_quat(motion.object_orientation, scalar_first=True)
         self.turn, self.position = turn.as_matrix(), palm.apply(motion.object_position - motion.base_position)
         self.up = palm.apply([0.0, 0.0, 1.0])
+        joint = held(folder)
+        self.mount = None if joint is None else Mount.of(folder, joint, palm)
         contacts = range(len(motion.contact_names))
         moments = np.zeros_like(motion.contact_force) if motion.contact_moment is None else motion.contact_moment
         self.forces, self.moments = (
@@ -145,11 +149,17 @@ class Stability:
             reach = self.first[c][1][placed.sample]
             moment = acts * np.sum(planned * reach, axis=1, keepdims=True) * normal
             total[:, :3] += force
-            total[:, 3:6] += np.cross(point - placed.position, force) + moment
+            total[:, 3:6] += np.cross(point - self._centre(placed.sample, placed.position), force) + moment
             pressed = np.einsum("nij,ni->nj", placed.jacobian[:, :3], force)
             turned = np.einsum("nij,ni->nj", placed.jacobian[:, 3:], np.cross(point, force) + moment)
             total[:, 6:] -= (pressed + turned) * self.moves[c]
+        if self.mount is not None:
+            total[:, :6] += self.mount.loaded(placed.sample, placed.position)
         return total
+
+    def _centre(self, sample: np.ndarray, position: np.ndarray) -> np.ndarray:
+        """Return what twists are about, (N, 3) m, palm frame: the object's centre of mass, or a point of its joint."""
+        return position if self.mount is None else self.mount.pivot[sample]
 
     @cached_property
     def planned(self) -> Placements:
@@ -167,9 +177,13 @@ class Stability:
         motion, jacobian = self.folder.motion, self.planned.jacobian[k]
         active = np.flatnonzero(motion.contact_active[k])
         grasp, spins, stiff = [], [], []
+        centre = self._centre(np.array([k]), self.position[[k]])[0]
+        if self.mount is not None:
+            held_back = self.mount.held_back(k)
+            grasp.append(np.hstack([held_back, np.zeros((len(held_back), jacobian.shape[1]))]))
         for c in active:
             point, normal = (values[k] for values in self.first[c])
-            grasp.append(np.hstack([np.eye(3), -pin.skew(point - self.position[k]), -self._moved(k, int(c))]))
+            grasp.append(np.hstack([np.eye(3), -pin.skew(point - centre), -self._moved(k, int(c))]))
             spins.append(np.concatenate([np.zeros(3), normal, -(normal @ jacobian[3:]) * self.moves[c]]))
             stiff.append(self._left(k, int(c)) / TWIST)
             if motion.contact_link[c] == "ground":
@@ -210,8 +224,10 @@ class Stability:
         if not len(sample):
             return [still] * count
         ways = STEP * np.hstack(spaces).T
+        arms = self.position[sample] - self._centre(sample, self.position[sample])
+        shifts = ways[:, :3] + np.cross(ways[:, 3:6], arms) if self.mount is not None else ways[:, :3]
         there, back = (
-            self.exerted(self.placed(sample, sign * ways[:, :3], sign * ways[:, 3:6], sign * ways[:, 6:]))
+            self.exerted(self.placed(sample, sign * shifts, sign * ways[:, 3:6], sign * ways[:, 6:]))
             for sign in (1.0, -1.0)
         )
         change = (there - back) / (2 * STEP)
@@ -223,6 +239,8 @@ class Stability:
             destabilising = space.T @ change[sample == k].T
             twisted = spins @ space
             needed = 0.5 * (destabilising + destabilising.T) - twisted.T @ (stiff[:, None] * twisted)
+            if self.mount is not None:
+                needed -= self.mount.sprung(k, space[:6])
             found.append(self._mode(k, space, needed))
         return found
 

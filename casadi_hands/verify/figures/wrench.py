@@ -7,7 +7,9 @@ import pinocchio as pin
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
+from casadi_hands.verify.figures.attached import along_world
 from casadi_hands.verify.figures.contact import Placements, active_contacts, surface_normals
+from casadi_hands.verify.held import held
 from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.report import Figure, of_actuator, worse
 
@@ -109,17 +111,30 @@ def disturbance_figure(folder: Folder, placed: Placements) -> Figure:
     After Ferrari and Canny: the wrenches that active contacts can exert are the convex hull of zero and of the edges of
     their friction pyramids (inscribed), the torsion of soft fingertips among them, where all normal forces together are
     at most ``RESERVE`` times the largest sum in the plan. The radius is the distance from the wrench that the plan
-    exerts to the hull's nearest face.
+    exerts to the hull's nearest face. Of an attached object only what moves it along its joint counts.
     """
     normals = np.zeros(len(folder.motion.time))
     for k, c in active_contacts(folder):
         normals[k] -= folder.motion.contact_force[k, c] @ surface_normals(folder, placed, k, c)[0]
     budget = RESERVE * float(np.max(normals)) / folder.weight
-    radii = [disturbance_radius(*_cones(folder, placed, k, budget)) for k in range(len(folder.motion.time))]
+    cones = [_cones(folder, placed, k, budget) for k in range(len(folder.motion.time))]
+    joint = held(folder)
+    if joint is None:
+        radii = [disturbance_radius(*each) for each in cones]
+    else:
+        scale = np.concatenate([np.full(3, 1.0 / folder.length if joint.turns else 1.0), np.ones(3)])
+        twists = along_world(folder, joint) * scale
+        radii = [least_margin(edges @ row, exerted @ row) for (edges, exerted), row in zip(cones, twists, strict=True)]
     k = int(np.argmin(radii))
     words = f"a disturbance of {{value}} at {folder.motion.time[k]:.3g} s is the smallest the grasp cannot resist"
     limit = folder.task.limits.disturbance_radius
     return Figure("disturbance_radius", radii[k], limit, "weight", words, at_least=True)
+
+
+def least_margin(edges: np.ndarray, exerted: float) -> float:
+    """Return how much more, either way, of ``edges`` (N,) along a joint there could be than what is exerted."""
+    most, least = float(edges.max(initial=0.0)), float(edges.min(initial=0.0))
+    return max(min(most - exerted, exerted - least), 0.0)
 
 
 def disturbance_radius(edges: np.ndarray, exerted: np.ndarray) -> float:

@@ -13,6 +13,7 @@ from casadi_hands.errors import DesignError
 from casadi_hands.verify.flat import Convex
 from casadi_hands.verify.reading.geoms import Geom, read_geom, read_looks
 from casadi_hands.verify.reading.markup import called, name_of, number, numbers, only, positive, read_xml, strangers
+from casadi_hands.verify.reading.mount import Mount, read_mount
 from casadi_hands.verify.reading.points import hull_points
 
 SHORTEST_STEP = 1e-4
@@ -61,6 +62,7 @@ class SceneBody:
     center: np.ndarray
     inertia: np.ndarray
     hinges: tuple[Hinge, ...]
+    mounts: tuple[Mount, ...]
     geoms: tuple[Geom, ...]
 
 
@@ -108,6 +110,7 @@ class Scene:
         welds: pairs of bodies that are held together.
         servos: in the file's order, which is that of MuJoCo's controls.
         springs: in the file's order.
+        threads: of two joints and (5,) the coefficients of the first one's polynomial in the second.
         keys: name -> attribute -> its numbers.
         meshes: polytopes by name.
         strange: what the format does not have, a sentence each.
@@ -122,6 +125,7 @@ class Scene:
     welds: list[tuple[str, str]] = field(default_factory=list)
     servos: list[Servo] = field(default_factory=list)
     springs: list[Spring] = field(default_factory=list)
+    threads: list[tuple[str, str, np.ndarray]] = field(default_factory=list)
     keys: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)
     meshes: dict[str, Convex] = field(default_factory=dict)
     strange: list[str] = field(default_factory=list)
@@ -152,7 +156,7 @@ def read_scene(path: Path) -> Scene:
     scene.strange.extend(strangers(root, _SECTIONS, "model"))
     allowed = {"compiler": ("", "angle"), "option": ("", _OPTIONS), "default": ("geom", ""), "contact": ("exclude", "")}
     allowed |= {"tendon": ("fixed", ""), "asset": ("mesh", "")}
-    allowed |= {"equality": ("weld", ""), "actuator": ("position", ""), "keyframe": ("key", "")}
+    allowed |= {"equality": ("weld joint", ""), "actuator": ("position", ""), "keyframe": ("key", "")}
     for tag, (tags, attributes) in allowed.items():
         if (element := section[tag]) is not None:
             scene.strange.extend(strangers(element, tags, attributes))
@@ -176,6 +180,10 @@ def _read_entry(path: Path, scene: Scene, element: Element) -> None:
     elif element.tag == "weld":
         scene.welds.append((element.get("body1", ""), element.get("body2", "")))
         odd += strangers(element, "", "body1 body2 solref")
+    elif element.tag == "joint":
+        pair = element.get("joint1", ""), element.get("joint2", "")
+        scene.threads.append((*pair, numbers(path, element, "polycoef", 5)))
+        odd += strangers(element, "", "joint1 joint2 polycoef solref solimp")
     elif element.tag == "position":
         joint = element.get("joint", "")
         kp, kv = positive(path, element, "kp"), number(path, element, "kv", "0")
@@ -221,7 +229,7 @@ def _read_body(path: Path, scene: Scene, element: Element, name: str) -> None:
         scene.strange.extend(strangers(element, "body geom inertial joint freejoint", "name pos quat gravcomp mocap"))
         inertial, free = only(path, element, "inertial"), only(path, element, "freejoint")
         scene.strange.extend(strangers(free, "", "name") if free is not None else ())
-        mass, center, inertia = 0.0, np.zeros(3), np.zeros((3, 3))
+        mass, center, inertia, joints = 0.0, np.zeros(3), np.zeros((3, 3)), element.findall("joint")
         if inertial is not None:
             mass, center = positive(path, inertial, "mass"), numbers(path, inertial, "pos", 3)
             xx, yy, zz, xy, xz, yz = numbers(path, inertial, "fullinertia", 6)
@@ -237,7 +245,8 @@ def _read_body(path: Path, scene: Scene, element: Element, name: str) -> None:
             mass=mass,
             center=center,
             inertia=inertia,
-            hinges=tuple(_read_hinge(path, scene, joint) for joint in element.findall("joint")),
+            hinges=() if name == "object" else tuple(_read_hinge(path, scene, joint) for joint in joints),
+            mounts=tuple(read_mount(path, scene.strange, joint) for joint in joints) if name == "object" else (),
             geoms=geoms,
         )
     for child in element.findall("body"):

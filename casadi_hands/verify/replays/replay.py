@@ -30,7 +30,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.errors import HandsError
+from casadi_hands.verify.held import held
 from casadi_hands.verify.reading.folder import Folder, read_folder
+from casadi_hands.verify.replays.mounted import turned_far
 from casadi_hands.verify.replays.perturb import Perturbation, draw_perturbation
 from casadi_hands.verify.replays.simulation import Observer, Plan, Simulation
 
@@ -63,6 +65,7 @@ class Replay:
         position_mean, position_max, position_final: m, over the motion and at its end.
         angle_mean, angle_max, angle_final: deg.
         dropped: the object was once farther from its plan than `DROP` says, or ended with no planned contact left.
+            Of an object on a joint, which does not fall, what its turn off the plan moves its surface by counts, too.
         lost_contacts: contacts that should touch at the end and do not.
         perturbation: what was different from the plan.
     """
@@ -169,6 +172,8 @@ class World(Protocol):
 
 
 def _drake(folder: Folder, perturbation: Perturbation) -> World:
+    if folder.task.object.attached is not None:
+        raise HandsError("replay with Drake is for free objects; this one is attached to the world: use MuJoCo")
     # It takes a second to load, and most replays do without.
     from casadi_hands.verify.replays.drake import DrakeSimulation
 
@@ -231,7 +236,9 @@ class Player:
         errors = np.stack(plan.errors(positions, quaternions), axis=1)
         due = [c for c in range(len(folder.motion.contact_names)) if folder.motion.contact_active[-1, c]]
         lost = [c for c in due if not scene.touches(folder.motion.contact_link[c])]
-        gone = not errors[:, 0].max() <= DROP * folder.length  # so that no number at all is gone, too
+        gone = (
+            not errors[:, 0].max() + turned_far(folder, held(folder), errors[:, 1]) <= DROP * folder.length
+        )  # so that no number at all is gone, too
         mean, largest, final = (values.tolist() for values in (errors.mean(axis=0), errors.max(axis=0), errors[-1]))
         return Replay(
             position_mean=mean[0],

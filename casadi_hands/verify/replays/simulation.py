@@ -13,9 +13,12 @@ from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation, Slerp
 
 from casadi_hands.errors import DesignError, HandsError
-from casadi_hands.verify.figures.dynamics import object_rotation, shoot
+from casadi_hands.verify.figures.attached import object_shots
+from casadi_hands.verify.figures.dynamics import object_rotation
+from casadi_hands.verify.held import held
 from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.replays.actuation import Actuation, OwnMotors, SharedMotors, bias
+from casadi_hands.verify.replays.mounted import Mounted
 from casadi_hands.verify.replays.perturb import Perturbation
 from casadi_hands.verify.trajectory import build_trajectory
 
@@ -78,7 +81,7 @@ class Plan:
                 f"{folder.path / 'motion.npz'}: no joint_commands, since an earlier version wrote it; "
                 f"`casadi-hands solve {folder.path / 'task.yaml'} --from {folder.path}` makes it anew"
             )
-        path = build_trajectory(folder, shoot(folder))
+        path = build_trajectory(folder, object_shots(folder))
         steps = np.arange(round((motion.time[-1] - motion.time[0]) / step) + 1)
         self.time = time = np.minimum(motion.time[0] + step * steps, motion.time[-1])
 
@@ -179,6 +182,8 @@ class Simulation:
         else:
             self._motors = SharedMotors(self._mujoco, model, folder, folder.drive, file)
         self._angles = [int(model.jnt_qposadr[joint]) for joint in joints]
+        joint = held(folder)
+        self._mounted = None if joint is None else Mounted(folder, joint, model, self._object)
         free = int(model.body_jntadr[self._object])
         self._pose, self._twist = int(model.jnt_qposadr[free]), int(model.jnt_dofadr[free])
 
@@ -202,6 +207,10 @@ class Simulation:
             self.model, self.data, self._mujoco.mj_name2id(self.model, self._mujoco.mjtObj.mjOBJ_KEY, "start")
         )
         self.data.qpos[self._angles] = folder.motion.joint_angles[0] + self._bias
+        if self._mounted is not None:
+            self._home = self._mounted.place(self.data, perturbation)
+            self._mujoco.mj_forward(self.model, self.data)
+            return
         turn = Rotation.from_rotvec(perturbation.start_turn) * object_rotation(folder)[0]
         position = folder.motion.object_position[0] + np.asarray(perturbation.start_shift)
         self._home = position, turn.inv().as_quat(scalar_first=True)
@@ -211,6 +220,8 @@ class Simulation:
 
     def object_pose(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the object's position (3,) and quaternion (4,) [w, x, y, z], world."""
+        if self._mounted is not None:
+            return self.data.xpos[self._object].copy(), self.data.xquat[self._object].copy()
         at = self._pose
         return self.data.qpos[at : at + 3], self.data.qpos[at + 3 : at + 7]
 
@@ -242,6 +253,9 @@ class Simulation:
 
     def _support(self, share: float) -> tuple[np.ndarray, np.ndarray]:
         """Return a share of the spring force and torque that hold the object at its start."""
+        if self._mounted is not None:
+            force, torque = self._mounted.support(self.data, self._perturbation.mass, SUPPORT)
+            return share * force, share * torque
         mass, (position, quaternion) = self.model.body_mass[self._object], self.object_pose()
         # About every axis by its own inertia: a thin object would be shaken by what serves its length.
         axes = self._matrix(self._product(quaternion, self.model.body_iquat[self._object]))
