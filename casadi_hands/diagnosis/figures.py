@@ -30,7 +30,9 @@ def friction_reason(model: Model, floating: Floating) -> Reason | None:
     k = int(np.argmax([np.linalg.norm(holding.missing) for holding in found]))
     worst, when = found[k], moment(model.schedule, model.schedule.keyframes[k])
     if not worst.held:
-        force, torque = (float(np.linalg.norm(part)) for part in (worst.missing[:3], worst.missing[3:]))
+        sliding = model.attachment is not None and not model.attachment.turning
+        parts = np.split(worst.missing, [3 if model.attachment is None else int(sliding)])
+        force, torque = (float(np.linalg.norm(part)) for part in parts)
         missing = [f"a force of {force:.2f} weights"] if force > HELD / 2 else []
         missing += [f"a torque of {1e3 * torque * model.units.torque:.3g} mN·m"] if torque > HELD / 2 else []
         what = (

@@ -16,16 +16,19 @@ if TYPE_CHECKING:
 _STIFF = {"solref": "0.002 1", "solimp": "0.99 0.999 0.0001"}
 
 
-def add_joints(body: Element, attached: Attached, motion: Motion) -> None:
-    """Add the joint to the object's body, which stands as at the motion's first sample.
+def add_joints(body: Element, attached: Attached | None, motion: Motion) -> None:
+    """Add the joint to the object's body, which stands as at the motion's first sample; a free one's is free.
 
     The axis moves neither in the object nor in the world, so that it is where the object's frame has it.
 
     Args:
         body: the object's.
-        attached: its joint.
+        attached: its joint, or None.
         motion: says where the joint is at the start.
     """
+    if attached is None:
+        SubElement(body, "freejoint", name="object")
+        return
     joint = attached.joint
     begin = 0.0 if motion.attachment_position is None else float(motion.attachment_position[0])
     resisting = {

@@ -173,10 +173,7 @@ def _add_object(world: Element, task: Task, motion: Motion) -> None:
         task.object,
     )
     body = SubElement(world, "body", start, name="object")
-    if item.attached is None:
-        SubElement(body, "freejoint", name="object")
-    else:
-        add_joints(body, item.attached, motion)
+    add_joints(body, item.attached, motion)
     add_inertial(body, Inertial(item.mass, np.asarray(item.center_of_mass), np.asarray(item.inertia)))
     for name, solid in object_solids(task).items():
         geom = {"name": name, "priority": "1", "friction": _friction(task)}

@@ -16,8 +16,10 @@ from casadi_hands.nlp.layout import Label
 from casadi_hands.terms.finger import PROXIMITY
 
 # What all else decides.
-FOLLOWING = ("rate", "wrench", "middle_torque", "spin", "holding", "twist_torque", "slip", "sticking", "motors")
-FOLLOWING += ("coordinate_speed", "stuck")
+FOLLOWING = (
+    *("rate", "wrench", "middle_torque", "spin", "holding", "twist_torque", "slip", "sticking", "motors"),
+    *("coordinate_speed", "stuck"),
+)
 FORCE_SHARE = 0.1  # lengths that are as far to go as a force of one weight
 
 
