@@ -38,6 +38,8 @@ def build_model(task: Task) -> Model:
     """Turn a task into nondimensional numbers; contacts that are not placed yet are left out."""
     gravity_size = float(np.linalg.norm(task.gravity))
     acceleration = gravity_size if gravity_size > 0 else STANDARD_GRAVITY
+    if task.force_unit > task.object.mass * acceleration:
+        acceleration = task.force_unit / task.object.mass
     length = task.object.characteristic_length
     units = Units(length, task.object.mass * acceleration, acceleration)
     times, places, turns = zip(*task.palm.waypoints, strict=True)

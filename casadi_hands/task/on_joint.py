@@ -87,3 +87,24 @@ def joint_problems(body: ManipulatedObject, goals: tuple[Goal, ...], turns: np.n
                 f"{np.degrees(tilted):.3g}° off it (or give its {which} instead)"
             )
             yield Problem(("motion", number, "position"), str(list(goal.position or ())), allowed)
+
+
+def resisting_force(body: ManipulatedObject, goals: tuple[Goal, ...], turns: np.ndarray) -> float:
+    """The largest force, N, with which joint and world resist the object at its goals; 0 of a free one.
+
+    Torques count as forces at the characteristic length, and so does what they resist together.
+
+    Args:
+        body: the object.
+        goals: with poses.
+        turns: (G, 3) rad, world, of the object at every goal from its orientation at the first one.
+    """
+    length, most = body.characteristic_length, 0.0
+    for goal in goals:
+        if goal.exert is not None:
+            most = max(most, *np.linalg.norm([goal.exert.force, np.array(goal.exert.torque) / length], axis=1).tolist())
+    if body.attached is None:
+        return most
+    joint = body.attached.joint
+    spring = joint.stiffness * float(np.abs(coordinates(joint, goals, turns)).max())
+    return max(most, (joint.friction + spring) / (length if joint.turns else 1.0))

@@ -25,7 +25,7 @@ from casadi_hands.task.limits import USUAL_DEFLECTION, Limits, usual_replay_posi
 from casadi_hands.task.material import hinge_loads
 from casadi_hands.task.motion import Goal, Perturbation
 from casadi_hands.task.object import ManipulatedObject
-from casadi_hands.task.on_joint import placed
+from casadi_hands.task.on_joint import placed, resisting_force
 from casadi_hands.task.palm import Palm
 from casadi_hands.task.region import counted_fingers
 from casadi_hands.task.search import Search
@@ -189,8 +189,12 @@ class Task(Section):
 
     @property
     def force_unit(self) -> float:
-        """The object's weight, N; with gravity off, what it would be at 9.81 m/s²."""
-        return self.object.mass * (float(np.linalg.norm(self.gravity)) or STANDARD_GRAVITY)
+        """The unit of force, N, which is called a weight: the object's; with gravity off, what it would be at 9.81 m/s².
+
+        Where more resists the object, its joint or the world that it presses on, as much as that.
+        """
+        weight = self.object.mass * (float(np.linalg.norm(self.gravity)) or STANDARD_GRAVITY)
+        return max(weight, resisting_force(self.object, self.motion, self.goal_turns()))
 
     def goal_poses(self) -> tuple[tuple[float, np.ndarray, np.ndarray], ...]:
         """Time (s), position (3,) (m, world) and rotation vector (3,) (rad) of the object at every goal.
