@@ -189,7 +189,7 @@ class Task(Section):
 
     @property
     def force_unit(self) -> float:
-        """The unit of force, N, which is called a weight: the object's; with gravity off, what it would be at 9.81 m/s².
+        """The unit of force, N, called a weight: the object's; with gravity off, what it would be at 9.81 m/s².
 
         Where more resists the object, its joint or the world that it presses on, as much as that.
         """

@@ -81,8 +81,8 @@ class Folder:
     def weight(self) -> float:
         """The unit of force, N: m·g, and m·9.81 when the task has no gravity.
 
-        Where the object's joint resists with more, or the object exerts more on the world, as much as that; a torque is a
-        force at the unit of lever arms.
+        Where the object's joint resists with more at a goal, or the object exerts more on the world, as much as that; a
+        torque is a force at the unit of lever arms.
         """
         weight = float(self.task.object.mass) * (float(np.linalg.norm(self.gravity)) or STANDARD_GRAVITY)
         loads, attached, motion = [weight], self.task.object.attached, self.motion
@@ -92,7 +92,10 @@ class Folder:
                 loads.append(float(np.linalg.norm(goal.exert.torque)) / self.length)
         if attached is not None:
             joint, lever = attached.joint, 1.0 if attached.slider is not None else self.length
-            travel = 0.0 if motion.attachment_position is None else float(np.abs(motion.attachment_position).max())
+            travel = 0.0
+            if motion.attachment_position is not None:
+                times = np.array([goal.at for goal in self.task.motion])
+                travel = float(np.abs(np.interp(times, motion.time, motion.attachment_position)).max())
             loads.append((joint.friction + joint.stiffness * travel) / lever)
         return max(loads)
 
