@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.geometry.bodies.capsule import Capsule
+from casadi_hands.stages.refine import newton_euler
 from casadi_hands.stages.refine import object_kernels as body
 from tests.stages.blocks import STEP, STILL, Place, check_block, coal_distance, numbers, segment, surface
 from tests.stages.example import palm_apart
@@ -95,7 +96,7 @@ def test_physics_is_that_of_scipy_s_integrator(seed: int) -> None:
         variables, parameters = Carried(seed, share).physics()
         change = (variables["rate1"] - variables["rate0"]) / (share * STEP)
         assert np.abs(change[3:]).max() > 5  # rad/s²; the torques change all the way in one step
-        found = numbers(body.physics(), variables, parameters)
+        found = numbers(newton_euler.physics(), variables, parameters)
         np.testing.assert_allclose(found["object_acceleration"], change @ change, rtol=1e-12)
         defects.append(np.abs(found["defect"]).max())
     assert defects[0] < 1e-3
@@ -106,14 +107,14 @@ def test_physics_is_that_of_scipy_s_integrator(seed: int) -> None:
 
 def test_physics_names_what_is_off() -> None:
     variables, parameters = Carried(1).physics()
-    plain = numbers(body.physics(), variables, parameters)["defect"]
+    plain = numbers(newton_euler.physics(), variables, parameters)["defect"]
     pushed = {**variables, "wrench1": variables["wrench1"] + [0.02, 0, 0, 0, 0, 0]}
-    moved = numbers(body.physics(), pushed, parameters)["defect"] - plain
+    moved = numbers(newton_euler.physics(), pushed, parameters)["defect"] - plain
     # Half the step's mean of 0.02 m·g more: a change of speed of 0.01 g·step, and nothing turns.
     speed = 0.01 * STEP / parameters["inertial"]  # type: ignore[operator]
     assert np.linalg.norm(moved[6:9]) == pytest.approx(speed, rel=0.1)
     np.testing.assert_allclose(moved[[3, 4, 5, 9, 10, 11]], 0, atol=1e-12)
-    slower = numbers(body.physics(), {**variables, "rate0": variables["rate0"] * 0.99}, parameters)["defect"]
+    slower = numbers(newton_euler.physics(), {**variables, "rate0": variables["rate0"] * 0.99}, parameters)["defect"]
     np.testing.assert_allclose(slower[:3] - plain[:3], 0.01 * STEP * variables["rate0"][:3], atol=2e-4)
 
 
@@ -416,7 +417,7 @@ def test_derivatives_agree_with_differences() -> None:
     ends = {"point0": points[:6], "force0": forces[:6], "point1": points[6:], "force1": forces[6:]}
     primitives = np.hstack([rng.normal(size=(2, 6)), [[0.2], [0.3]]])
     for kernel, (variables, parameters) in (
-        (body.physics(), Carried(0).physics()),
+        (newton_euler.physics(), Carried(0).physics()),
         (body.wrench(2, False), ({"wrench": rng.normal(size=6), "point": points[:6], "force": forces[:6]}, {})),
         (body.middle_torque(2, False), ({"middle_torque": rng.normal(size=3), **ends}, {})),
         (
@@ -447,4 +448,4 @@ def test_derivatives_are_finite_where_nothing_moves_and_nothing_presses() -> Non
     check_block(body.ground_rolling(Capsule), *slipping(lying, point, lying, point), h=1e-6)
     variables, parameters = Carried(0).physics()
     still = {name: np.zeros_like(value) for name, value in variables.items()}
-    check_block(body.physics(), still, {**parameters, "reference": STILL}, h=1e-6)
+    check_block(newton_euler.physics(), still, {**parameters, "reference": STILL}, h=1e-6)
