@@ -103,8 +103,9 @@ def physics() -> Kernel:
     sped -= damped * (q[1] - q[0])
     moved -= damped * step * (mean - q[0])
     kernel.cost(body.KNOT_ACCELERATION, (rates[1] - rates[0]) / step)
-    defect = (q[1] - q[0] - step * speeds[0] - moved, speeds[1] - speeds[0] - sped)
-    kernel.constrain(limits.DEFECT, ca.vertcat(*defect))
+    defect = ((q[1] - q[0] - step * speeds[0] - moved) / step, speeds[1] - speeds[0] - sped)
+    # As the forces that nothing exerts: of a light object, motions would be too much of a lever.
+    kernel.constrain(limits.DEFECT, inertia / step * ca.vertcat(*defect))
     return kernel
 
 
