@@ -49,7 +49,7 @@ def test_an_angle_turns_the_object_about_the_axis(joint: str, advance: float) ->
 def test_a_distance_moves_the_object_along_the_axis() -> None:
     goal = task(SLIDER, "distance: 0.02").motion[1]
     centre = np.array([0.1, 0, 0.1]) + Rotation.from_euler("x", 30, degrees=True).apply([0.03, 0.02, 0])
-    np.testing.assert_allclose(goal.position, centre + [0.02, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(goal.position, centre + np.array([0.02, 0, 0]), atol=1e-12)
 
 
 @pytest.mark.parametrize(("joint", "goal"), [(HINGE, "angle: 200"), (SCREW, "angle: -70"), (SLIDER, "distance: 0.02")])

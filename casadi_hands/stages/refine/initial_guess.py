@@ -34,11 +34,11 @@ def rates_and_wrenches(model: Model, position: Array, vector: Array) -> tuple[Ar
     spins = np.array([reference.T @ pin.Jexp3(v) @ w for v, w in zip(vector, turn(times, 1), strict=True)])
     spun = CubicSpline(times, spins)(times, 1)
     inertial, inertia = model.units.inertial, model.inertia
-    plan = model.scenarios[0]
-    force = np.einsum("sij,sj->si", to_object, inertial * path(times, 2) - model.gravity - plan.force)
+    force = np.einsum("sij,sj->si", to_object, inertial * path(times, 2) - model.gravity)
     torque = inertial * (np.cross(spins, spins @ inertia.T) + spun @ inertia.T)
     if model.exerted:
-        torque -= np.einsum("sij,sj->si", to_object, plan.torque)
+        force -= np.einsum("sij,sj->si", to_object, model.scenarios[0].force)
+        torque -= np.einsum("sij,sj->si", to_object, model.scenarios[0].torque)
     return np.hstack([path(times, 1), spins]), np.hstack([force, torque])
 
 
