@@ -31,6 +31,8 @@ from casadi_hands.problem.si import LEAST, RESERVE, motion_in_si
 from casadi_hands.task import Task
 
 Array = NDArray[np.float64]
+KINKS = 1e-7, 5e-5
+"""Lengths by which the rounding of kinks moves surfaces: more than a solver's accuracy, and at most."""
 
 
 def floating_motion(model: Model, floating: Floating) -> Motion:
@@ -54,7 +56,7 @@ def whole_hand_motion(model: Model, result: WholeHand) -> Motion:
     """
     count = len(result.force)
     names = tuple(contact.name for contact in model.contact_table)
-    point = np.array([on_bodies(p, model.touched) for p in result.point])
+    point = np.array([_on_surfaces(p, model) for p in result.point])
     on_link = np.zeros_like(point)
     links = ["none"] * model.contacts + (["ground"] if model.ground is not None else [])
     for i, (finger, contact) in enumerate(zip(result.fingers, result.contacts, strict=True)):
@@ -91,6 +93,17 @@ def whole_hand_motion(model: Model, result: WholeHand) -> Motion:
         external_force_disturbed=model.scenarios[1].force * model.units.force,
         external_torque_disturbed=model.scenarios[1].torque * model.units.torque,
     )
+
+
+def _on_surfaces(points: Array, model: Model) -> Array:
+    """Contact points (C, 3) on the surfaces that they touch.
+
+    Constraints round the kinks of some bodies, which puts points off the true surface by next to nothing; there they
+    stay, since forces that act there are what moves the object.
+    """
+    moved = on_bodies(points, model.touched)
+    off = np.linalg.norm(moved - points, axis=1)[:, None]
+    return np.where((off > KINKS[0]) & (off < KINKS[1]), points, moved)
 
 
 def _on_joint(model: Model, motion: Motion, result: WholeHand) -> Motion:
