@@ -49,6 +49,7 @@ def design_record(design: Result) -> dict[str, Any]:
         "gravity": task.gravity,
         "ground_height": task.ground.height if task.ground else None,
         "ground_friction": task.ground.friction if task.ground else None,
+        "attached": _attached(task),
         "goals": _goals(task),
         "hand": _hand(design.hand) if design.hand else None,
         "degrees_of_freedom": design.hand.degrees_of_freedom if design.hand else None,
@@ -156,11 +157,26 @@ def _shape(shape: Any) -> dict[str, Any]:
     return {"type": shape.body.kind, **given}
 
 
+def _attached(task: Task) -> dict[str, Any] | None:
+    """The joint that holds the object to the world, axis and point in the object's frame."""
+    if task.object.attached is None:
+        return None
+    joint = task.object.attached.joint
+    turning = {"point": joint.pivot, "advance": joint.advance} if joint.turns else {}
+    resisting = {"friction": joint.friction, "stiffness": joint.stiffness, "damping": joint.damping}
+    return {"joint": task.object.attached.kind, "axis": joint.direction, **turning, **resisting}
+
+
 def _goals(task: Task) -> list[dict[str, Any]]:
     if task.tool is not None:
         return [{"time": goal.at, "point": goal.tool_at, "tool_point": task.tool} for goal in task.motion]
     return [
-        {"time": goal.at, "position": goal.position, "orientation": rotation_quaternion(goal.rotation.vector)}
+        {
+            "time": goal.at,
+            "position": goal.position,
+            "orientation": rotation_quaternion(goal.rotation.vector),
+            **({"exert": goal.exert.model_dump()} if goal.exert else {}),
+        }
         for goal in task.motion
     ]
 

@@ -32,6 +32,10 @@ _UNITS = {
     "external_torque": "N m",
     "external_force_disturbed": "N",
     "external_torque_disturbed": "N m",
+    # In rad, rad/s and N m, of a slider in m, m/s and N.
+    "attachment_position": "",
+    "attachment_velocity": "",
+    "attachment_friction": "",
 }
 """Every array with a row for each sample, in the order of the columns."""
 

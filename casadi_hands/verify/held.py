@@ -19,6 +19,7 @@ from numpy.polynomial.legendre import leggauss
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.verify.reading.folder import Folder
+from casadi_hands.verify.reading.stored import entry
 
 _POINTS, _WEIGHTS = leggauss(8)
 SHARES, WEIGHTS = (_POINTS + 1) / 2, _WEIGHTS / 2
@@ -129,7 +130,10 @@ def joint_problems(folder: Folder) -> list[str]:
     given = [name for name in names if getattr(motion, name) is not None]
     if joint is None:
         return [f"{name}: in motion.npz, though the object is attached to nothing" for name in given]
-    problems = [f"{name}: missing, though a joint holds the object" for name in names if name not in given]
+    kind = folder.task.object.attached.kind  # type: ignore[union-attr]
+    stated = entry(folder.result, "attached", "joint")
+    problems = [] if stated == kind else [f"attached: result.json says {stated or 'none'}, task.yaml says {kind}"]
+    problems += [f"{name}: missing, though a joint holds the object" for name in names if name not in given]
     due, turn = joint.place(course(folder, joint).position)
     off = np.linalg.norm(motion.object_position - due, axis=1) / folder.length
     angle = (turn.inv() * Rotation.from_quat(motion.object_orientation, scalar_first=True)).magnitude()

@@ -80,7 +80,8 @@ def resting(value: float) -> dict[str, np.ndarray]:
 
 
 def read(scene: Scene, directory: Path) -> Folder:
-    return read_folder(scene.write(directory / "result"))
+    kind = next(iter(scene.task.object.attached.model_dump(exclude_none=True)))  # type: ignore[union-attr]
+    return read_folder(replace(scene, changes={"attached": {"joint": kind}}).write(directory / "result"))
 
 
 @pytest.mark.parametrize(("joint", "goal"), JOINTS)

@@ -43,8 +43,11 @@ def write_usd(source: Source, out: Path) -> Path:
         the folder.
 
     Raises:
-        HandsError: urdf-usd-converter is not installed, or the folder holds something else or cannot be written.
+        HandsError: urdf-usd-converter is not installed, the folder holds something else or cannot be written, or the
+            object is attached to the world.
     """
+    if source.task.object.attached is not None:
+        raise HandsError("usd: its object would be free; this one is attached to the world, as scene.xml has it")
     usd = _load()
     hand = _converted(usd, "hand", source.welded_urdf())
     _drive(usd, hand, source)

@@ -19,6 +19,7 @@ _UNITS = {
     **dict.fromkeys(("joint_angles", "joint_commands", "motor_positions"), "rad"),
     **{"time": "s", "joint_velocities": "rad/s"},
     **dict.fromkeys(("object_orientation", "base_orientation", "contact_active"), ""),
+    **dict.fromkeys(("attachment_position", "attachment_velocity", "attachment_friction"), ""),
 }
 
 
