@@ -100,3 +100,16 @@ class Attachment:
 def dry_friction(attachment: Attachment, speeds: Array, moving: float) -> Array:
     """(T,) dry friction against speeds (T,), full where they are well above ``moving``."""
     return -attachment.friction * speeds / np.sqrt(speeds**2 + moving**2)
+
+
+def directions(attachment: Attachment, goal_times: Array, times: Array) -> Array:
+    """Which way (T,) an attached object goes at times (T,): 1, -1, or 0 where it rests or turns back.
+
+    Args:
+        attachment: with the goals.
+        goal_times: (G,) s.
+        times: s.
+    """
+    ways = np.concatenate([[0.0], np.sign(np.round(np.diff(attachment.goals), 12)), [0.0]])
+    before, after = (np.searchsorted(goal_times, times - 1e-9), np.searchsorted(goal_times, times + 1e-9))
+    return np.asarray(np.where(ways[before] == ways[after], ways[before], 0.0))

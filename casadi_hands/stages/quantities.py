@@ -25,7 +25,7 @@ _QUANTITIES = {
     "invariant": Quantity("contact invariants: 1 where a contact acts, 0 where it does not", ""),
     "coordinate": Quantity("of the joint that holds the object", "rad or length"),
     "coordinate_speed": Quantity("of the joint's coordinate", "rad/s or length/s"),
-    "stuck": Quantity("share of the joint's friction that balance asks for, of what its motion leaves free", ""),
+    "drag": Quantity("the joint's friction along its coordinate, of all it has", ""),
     "palm": Quantity("palm's offset from its given motion: translation and rotation vector, world", _POSE),
     "torsion": Quantity("moments of contacts about the object's outward normals, over their radius", "m·g"),
     "twist_torque": Quantity("the torque of all contacts' torsion; object frame", _TORQUE),

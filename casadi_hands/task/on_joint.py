@@ -102,7 +102,8 @@ def resisting_force(body: ManipulatedObject, goals: tuple[Goal, ...], turns: np.
     length, most = body.characteristic_length, 0.0
     for goal in goals:
         if goal.exert is not None:
-            most = max(most, *np.linalg.norm([goal.exert.force, np.array(goal.exert.torque) / length], axis=1).tolist())
+            force, torque = (float(np.linalg.norm(each)) for each in (goal.exert.force, goal.exert.torque))
+            most = max(most, force, torque / length)
     if body.attached is None:
         return most
     joint = body.attached.joint

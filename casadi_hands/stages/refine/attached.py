@@ -1,9 +1,9 @@
 """An object on a joint in the refine stage: its pose is the joint's, and physics is asked along the one coordinate.
 
 The joint neither moves in the world nor in the object, so that the contacts' part of what moves it along is a constant
-row, the twist, times their wrench in the object's frame. Dry friction acts against the motion; where it rests up to
-``JOINT_HOLDING`` of it does what balance asks. Between knots the coordinate is the cubic that has its values and
-speeds at both.
+row, the twist, times their wrench in the object's frame. Dry friction acts against the motion, which goes where
+the next goal is; at rest up to ``HOLDING`` of it does what balance asks. Between knots the coordinate is the cubic
+that has its values and speeds at both.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from casadi_hands.motion import conjugate, exponential, multiply, rotation_matrix
 from casadi_hands.nlp import Kernel
-from casadi_hands.problem.attachment import MOVING, Attachment
+from casadi_hands.problem.attachment import directions
 from casadi_hands.problem.hand_motion import OnJoint
 from casadi_hands.problem.model import Model
-from casadi_hands.stages.refine.declaration import JOINT_HOLDING, Declaration
+from casadi_hands.stages.refine.declaration import Declaration
 from casadi_hands.stages.refine.newton_euler import GAUSS, GAUSS_WEIGHTS
 from casadi_hands.stages.refine.torsion import twist_torque
 from casadi_hands.terms import body
 from casadi_hands.terms import constraints as limits
-from casadi_hands.terms.contact import saturated
 
 Array = NDArray[np.float64]
+HOLDING = 0.5  # share of its dry friction that a joint at rest may need: who knows how much there is
 _JOINT = (("turn_axis", 3), ("joint_axis", 3), ("pivot", 3), ("joint_start", 3), ("advance", 1), ("freedom", 6))
 _LOADS = (("joint_mass", 1), ("joint_friction", 1), ("joint_stiffness", 1), ("joint_damping", 1))
 _WORLD = (("reference", 4), ("gravity", 3))
@@ -55,12 +55,6 @@ def on_joint() -> Kernel:
     return kernel
 
 
-def _drag(given: dict[str, SX], speed: SX, stuck: SX) -> SX:
-    """Dry friction along the coordinate at a speed."""
-    fully = saturated(speed, SX(MOVING))
-    return -given["joint_friction"] * (fully - (1 - fully**2) * stuck)
-
-
 def _outside(given: dict[str, SX], coordinate: SX, force: SX, torque: SX) -> SX:
     """What weight, and a force and a torque (3,) in the world, do along the coordinate, its spring's force added."""
     to_object = rotation_matrix(conjugate(multiply(exponential(coordinate * given["turn_axis"]), given["reference"])))
@@ -73,9 +67,9 @@ def _outside(given: dict[str, SX], coordinate: SX, force: SX, torque: SX) -> SX:
 def physics() -> Kernel:
     """Newton and Euler along the coordinate from one knot to the next, as `newton_euler.physics` has them."""
     kernel = Kernel("physics")
-    q, speeds, stuck = (
+    q, speeds, drags = (
         [kernel.variable(f"{name}{i}", 1, name, i) for i in range(2)]
-        for name in ("coordinate", "coordinate_speed", "stuck")
+        for name in ("coordinate", "coordinate_speed", "drag")
     )
     rates, wrenches = ([kernel.variable(f"{name}{i}", 6, name, i) for i in range(2)] for name in ("rate", "wrench"))
     middle, step = kernel.variable("middle_torque", 3), kernel.parameter("step")
@@ -85,7 +79,6 @@ def physics() -> Kernel:
     )
     free, inertia = given["freedom"], given["inertial"] * given["joint_mass"]
     bend = 2 * (wrenches[0][3:] + wrenches[1][3:]) - 4 * middle
-    drags = [_drag(given, speed, held) for speed, held in zip(speeds, stuck, strict=True)]
 
     def blend(ends: list[SX], s: float) -> SX:
         return (1 - s) * ends[0] + s * ends[1]
@@ -94,7 +87,8 @@ def physics() -> Kernel:
     for s, weight in zip(GAUSS.tolist(), GAUSS_WEIGHTS.tolist(), strict=True):
         launched, arriving = step * s * (1 - s) ** 2 * speeds[0], step * s**2 * (s - 1) * speeds[1]
         there = q[0] + s**2 * (3 - 2 * s) * (q[1] - q[0]) + launched + arriving
-        pushed = ca.dot(free, blend(wrenches, s)) + s * (s - 1) * ca.dot(free[3:], bend) + blend(drags, s)
+        pushed = ca.dot(free, blend(wrenches, s)) + s * (s - 1) * ca.dot(free[3:], bend)
+        pushed += given["joint_friction"] * blend(drags, s)
         acceleration = (pushed + _outside(given, there, blend(forces, s), blend(torques, s))) / inertia
         sped += weight * step * acceleration
         moved += weight * (1 - s) * step**2 * acceleration
@@ -114,10 +108,10 @@ def equilibrium() -> Kernel:
     """What holds the object still at one knot along its coordinate, friction helping as far as it may, (1,)."""
     kernel = Kernel("equilibrium")
     coordinate, total = kernel.variable("coordinate", 1), kernel.variable("wrench", 6)
-    stuck = kernel.variable("stuck", 1)
+    drag = kernel.variable("drag", 1)
     given = _given(kernel, (("turn_axis", 3), ("freedom", 6), *_LOADS[1:3], *_WORLD))
     force, torque = kernel.parameter("planned_force", 3), kernel.parameter("planned_torque", 3)
-    outside = _outside(given, coordinate, force, torque) + _drag(given, SX(0), stuck)
+    outside = _outside(given, coordinate, force, torque) + given["joint_friction"] * drag
     kernel.constrain(limits.EQUILIBRIUM, ca.dot(given["freedom"], total) + outside)
     return kernel
 
@@ -178,7 +172,7 @@ def bind_rest(of: Declaration) -> None:
         equilibrium(),
         {"sum": (0, 0)},
         coordinate=rows["coordinate"].take(ends),
-        stuck=rows["stuck"].take(ends),
+        drag=rows["drag"].take(ends),
         wrench=of.wrench.take(ends),
         **still,
         **of.at(ends, "reference", "gravity", "planned_force", "planned_torque"),
@@ -207,11 +201,24 @@ def parameters(model: Model) -> dict[str, ArrayLike]:
     }
 
 
-def bounds(joint: Attachment, knots: int) -> dict[str, Array]:
-    """Upper bounds of the joint's variables, the lower ones their negatives: rest at both ends."""
-    speed = np.full((knots, 1), np.inf)
-    speed[[0, -1]] = 0.0
-    return {"coordinate_speed": speed, "stuck": np.full((knots, 1), JOINT_HOLDING if joint.friction else 0.0)}
+def bounds(model: Model) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Lower and upper bounds of the joint's speed and friction; none of a free object.
+
+    It rests at both ends and where no goal leads on. With friction it goes where goals are, against all of it.
+    """
+    joint, schedule = model.attachment, model.schedule
+    if joint is None:
+        return {}, {}
+    ways = directions(joint, schedule.samples[schedule.goal_samples], schedule.samples)[:, None]
+    ends = np.zeros_like(ways, bool)
+    ends[[0, -1]] = True
+    if not joint.friction:
+        speed = np.where(ends, 0.0, np.inf)
+        none = np.zeros_like(speed)
+        return {"coordinate_speed": -speed, "drag": none}, {"coordinate_speed": speed, "drag": none}
+    room = np.where(ways == 0, HOLDING, 0.0)
+    slow, fast = np.where(ways < 0, -np.inf, 0.0), np.where(ways > 0, np.inf, 0.0)
+    return {"coordinate_speed": slow, "drag": -ways - room}, {"coordinate_speed": fast, "drag": -ways + room}
 
 
 def result(model: Model, values: Mapping[str, Array]) -> OnJoint | None:
@@ -219,6 +226,5 @@ def result(model: Model, values: Mapping[str, Array]) -> OnJoint | None:
     joint = model.attachment
     if joint is None:
         return None
-    coordinate, speed, stuck = (values[name][:, 0] for name in ("coordinate", "coordinate_speed", "stuck"))
-    fully = speed / np.sqrt(speed**2 + MOVING**2)
-    return OnJoint(coordinate, speed, -joint.friction * (fully - (1 - fully**2) * stuck))
+    coordinate, speed, drag = (values[name][:, 0] for name in ("coordinate", "coordinate_speed", "drag"))
+    return OnJoint(coordinate, speed, joint.friction * drag)

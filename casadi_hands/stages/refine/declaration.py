@@ -19,8 +19,6 @@ from casadi_hands.stages.synthesis.stage import AXIS_RANGE
 
 JOINT_MARGIN = 0.005  # rad, so that a smooth curve through the knots stays within the limits between them
 HOLDING = 0.4  # share of its torsion that a contact at rest may need: tips differ, and age
-JOINT_HOLDING = 0.5
-"""Share of a joint's friction that balance may ask for at rest: with any speed's that is never more than all of it."""
 JOINT_SIZES = {"turn_axis": 3, "joint_axis": 3, "pivot": 3, "joint_start": 3, "advance": 1, "freedom": 6}
 JOINT_SIZES |= {"joint_mass": 1, "joint_friction": 1, "joint_stiffness": 1, "joint_damping": 1}
 FREE = (-np.inf, np.inf)
@@ -107,7 +105,7 @@ class Declaration:
             self._declare_coupling(model.motors)
         self.rows: dict[str, Rows] = {}
         if model.attachment is not None:
-            for name, most in (("coordinate", np.inf), ("coordinate_speed", np.inf), ("stuck", JOINT_HOLDING)):
+            for name, most in (("coordinate", np.inf), ("coordinate_speed", np.inf), ("drag", 1.0)):
                 self.rows[name] = problem.variable(name, (count, 1), -most, most)
 
     def _declare_coupling(self, motors: int) -> None:

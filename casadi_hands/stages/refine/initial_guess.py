@@ -7,7 +7,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from casadi_hands.problem.attachment import MOVING, dry_friction
+from casadi_hands.problem.attachment import directions
 from casadi_hands.problem.model import Model
 from casadi_hands.statics.grasp import grasp_map
 
@@ -51,7 +51,7 @@ def along_joint(model: Model, position: Array, vector: Array) -> tuple[dict[str,
         vector: (S, 3) rotation vectors from the reference.
 
     Returns:
-        ``pose`` and ``rate`` (S, 6), ``coordinate``, ``coordinate_speed`` and ``stuck`` (S, 1); and (S, 1) torque in
+        ``pose`` and ``rate`` (S, 6), ``coordinate``, ``coordinate_speed`` and ``drag`` (S, 1); and (S, 1) torque in
         m·g·length, of a slider force in m·g.
     """
     joint = model.attachment
@@ -62,9 +62,11 @@ def along_joint(model: Model, position: Array, vector: Array) -> tuple[dict[str,
     speed[[0, -1]] = 0.0
     pose, rate = joint.poses(coordinate), joint.rates(coordinate, speed)
     moved = model.unborne(rates_and_wrenches(model, pose[:, :3], pose[:, 3:])[1].T).T
-    resisted = joint.resistance(coordinate, speed) + dry_friction(joint, speed, MOVING)
+    schedule = model.schedule
+    drag = -directions(joint, schedule.samples[schedule.goal_samples], schedule.samples)
+    resisted = joint.resistance(coordinate, speed) + joint.friction * drag
     values = {"pose": pose, "rate": rate, "coordinate": coordinate[:, None], "coordinate_speed": speed[:, None]}
-    return {**values, "stuck": np.zeros((len(pose), 1))}, np.asarray(moved - resisted[:, None])
+    return {**values, "drag": drag[:, None]}, np.asarray(moved - resisted[:, None])
 
 
 def disturbance_wrenches(model: Model, vector: Array) -> Array:

@@ -18,7 +18,7 @@ from casadi_hands.terms.finger import PROXIMITY
 # What all else decides.
 FOLLOWING = (
     *("rate", "wrench", "middle_torque", "spin", "holding", "twist_torque", "slip", "sticking", "motors"),
-    *("coordinate_speed", "stuck"),
+    *("coordinate_speed", "drag"),
 )
 FORCE_SHARE = 0.1  # lengths that are as far to go as a force of one weight
 

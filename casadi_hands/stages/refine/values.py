@@ -135,7 +135,7 @@ class RefineValues:
         bearing, active = (np.repeat(np.where(f, most, 0.0), 3, axis=1) for f in (self.bearing, self._active))
         upper = {"rate": rate, "force": bearing}
         if model.attachment is not None:  # whose rates follow from its joint's
-            upper = {"force": bearing, **attached.bounds(model.attachment, count)}
+            upper = {"force": bearing}
         if model.torsion:
             upper["torsion"] = np.where(self.bearing[:, : len(self.structure.contacts)], most, 0.0)
         if model.sliding:
@@ -145,7 +145,8 @@ class RefineValues:
             # A disturbance may begin with a touch, and what resists it is no force that has to grow.
             upper["force_disturbed"] = active[self.disturbed]
         lower = {name: -bound for name, bound in upper.items()}
-        return {"pose": low_pose, **lower}, {"pose": high_pose, **upper}
+        joint_lower, joint_upper = attached.bounds(model)
+        return {"pose": low_pose, **lower, **joint_lower}, {"pose": high_pose, **upper, **joint_upper}
 
     def start(self, motion: WholeHand) -> dict[str, Array]:
         """Values of all variables: the motion, with velocities and forces that nearly obey it."""

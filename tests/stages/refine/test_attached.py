@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from casadi_hands.problem.attachment import MOVING, Attachment
+from casadi_hands.problem.attachment import Attachment
 from casadi_hands.problem.model import Model
 from casadi_hands.stages.refine import attached
 from tests.problem.test_attachment import CASES, held
@@ -34,20 +34,12 @@ class Driven:
         self.of, self.joint, self.step = of, joint, share * STEP
         self.points, self.forces = rng.normal(size=(2, 3, 3)), 0.1 * rng.normal(size=(2, 3, 3))
         self.world = 0.3 * rng.normal(size=(2, 2, 3))
-        self.stuck = rng.uniform(-0.4, 0.4, 2)
-        for pair in (self.points, self.forces, self.world):
+        self.drags = rng.uniform(-1, 1, 2)
+        for pair in (self.points, self.forces, self.world, self.drags):
             pair[1] = (1 - share) * pair[0] + share * pair[1]
         self.start = np.array([0.2, 0.4])
-        self.drags = np.array([self.drag(0.4, self.stuck[0]), 0.0])
-        # Friction is linear in time between what it is at both ends, the second of which follows from the first.
-        for _ in range(6):
-            solved = solve_ivp(self.slope, (0, self.step), self.start, method="DOP853", rtol=1e-13, atol=1e-15)
-            self.end = solved.y[:, -1]
-            self.drags[1] = self.drag(self.end[1], self.stuck[1])
-
-    def drag(self, speed: float, stuck: float) -> float:
-        fully = speed / np.hypot(speed, MOVING)
-        return float(-self.joint.friction * (fully - (1 - fully**2) * stuck))
+        solved = solve_ivp(self.slope, (0, self.step), self.start, method="DOP853", rtol=1e-13, atol=1e-15)
+        self.end = solved.y[:, -1]
 
     def slope(self, t: float, state: Array) -> Array:
         """Power of all forces over the speed, by the velocities of the points they act at."""
@@ -57,7 +49,8 @@ class Driven:
         turn = Rotation.from_rotvec(q * self.joint.turn_axis) * Rotation.from_quat(self.of.reference, scalar_first=True)
         velocity = turn.inv().apply(rate[:3]) + np.cross(rate[3:], points)
         power = np.sum(velocity * forces) + rate[:3] @ (self.of.gravity + force) + turn.apply(rate[3:]) @ torque
-        power += (1 - s) * self.drags[0] + s * self.drags[1] - self.joint.stiffness * q - self.joint.damping * speed
+        power += self.joint.friction * ((1 - s) * self.drags[0] + s * self.drags[1])
+        power -= self.joint.stiffness * q + self.joint.damping * speed
         return np.array([speed, power / (self.of.units.inertial * self.joint.mass)])
 
     def block(self) -> tuple[dict[str, object], dict[str, object]]:
@@ -68,7 +61,7 @@ class Driven:
         variables: dict[str, object] = {"middle_torque": wrench(self.points.mean(axis=0), self.forces.mean(axis=0))[3:]}
         for i in range(2):
             variables[f"coordinate{i}"], variables[f"coordinate_speed{i}"] = states[i]
-            variables[f"stuck{i}"] = self.stuck[i]
+            variables[f"drag{i}"] = self.drags[i]
             variables[f"rate{i}"] = self.joint.rates(states[i, :1], states[i, 1:])[0]
             variables[f"wrench{i}"] = wrench(self.points[i], self.forces[i])
         world = {f"planned_{name}{i}": self.world[i, k] for i in range(2) for k, name in enumerate(("force", "torque"))}
@@ -117,9 +110,26 @@ def test_rest_takes_weight_spring_and_the_world_s_answer(joint: str, goal: str) 
     wrench, force, torque = rng.normal(size=6), *rng.normal(size=(2, 3))
     keys = ("turn_axis", "freedom", "joint_friction", "joint_stiffness", "reference", "gravity")
     parameters = {name: given(of)[name] for name in keys} | {"planned_force": force, "planned_torque": torque}
-    variables = {"coordinate": 0.3, "wrench": wrench, "stuck": 0.25}
+    variables = {"coordinate": 0.3, "wrench": wrench, "drag": 0.25}
     rate = attachment.rates(np.array([0.3]), np.array([1.0]))[0]
     turn = Rotation.from_rotvec(0.3 * attachment.turn_axis) * Rotation.from_quat(of.reference, scalar_first=True)
     due = rate[:3] @ (turn.apply(wrench[:3]) + of.gravity + force) + rate[3:] @ (wrench[3:] + turn.inv().apply(torque))
     due += 0.25 * attachment.friction - 0.3 * attachment.stiffness
     assert numbers(attached.equilibrium(), variables, parameters)["sum"] == pytest.approx(due, rel=1e-10)
+
+
+def test_friction_is_against_the_way_to_the_next_goal() -> None:
+    joint = "hinge: {point: [0, 0, 0], axis: [0, 0, 1], friction_torque: 0.02}"
+    goal = "angle: 40}\n  - {at: 3, angle: 40}\n  - {at: 5, angle: 10}\n  - {at: 6, angle: -10"
+    of, _ = held(joint, goal)
+    lower, upper = attached.bounds(of)
+    times = of.schedule.samples
+    for k, time in enumerate(times):
+        least, most = lower["drag"][k, 0], upper["drag"][k, 0]
+        slow, fast = lower["coordinate_speed"][k, 0], upper["coordinate_speed"][k, 0]
+        if 0 < time < 2 - 1e-9:
+            assert (least, most, slow, fast) == (-1, -1, 0, np.inf)
+        elif 3 + 1e-9 < time < 6 - 1e-9:
+            assert (least, most, slow, fast) == (1, 1, -np.inf, 0)
+        else:  # at both ends, from 2 s to 3 s, and where it turns back
+            assert (least, most, slow, fast) == (-attached.HOLDING, attached.HOLDING, 0, 0)
