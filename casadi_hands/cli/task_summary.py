@@ -14,6 +14,7 @@ from casadi_hands.diagnosis.impossible import findings
 from casadi_hands.placement.place import Proposal, propose
 from casadi_hands.problem.si import build_model
 from casadi_hands.task import FingerSpec, Goal, Task
+from casadi_hands.task.attached import Attached
 
 
 def check_summary(task: Task, questions: Sequence[str] = ()) -> tuple[RenderableType, bool]:
@@ -72,6 +73,8 @@ def _lines(task: Task, force_limit: float) -> Iterator[tuple[str, str]]:
     for mesh in task.object.meshes or ():
         yield "", f"{mesh.file}: {mesh.sentence}"
     yield "", f"inertia, principal: {_numbers(np.linalg.eigvalsh(np.array(task.object.inertia)))} kg·m²"
+    if task.object.attached is not None:
+        yield "", _joint(task.object.attached)
     yield "palm", _palm(task)
     for i, (name, finger) in enumerate(task.fingers.items()):
         yield "" if i else "fingers", f"{name} {_touches(finger)}"
@@ -116,6 +119,20 @@ def _object(task: Task) -> str:
     return f"{task.object.mass:g} kg; {shapes}, {2e3 * task.object.characteristic_length:.4g} mm at its longest"
 
 
+def _joint(attached: Attached) -> str:
+    joint, unit = attached.joint, "N·m" if attached.joint.turns else "N"
+    place = f"about {_numbers(joint.direction)} at {_mm(joint.pivot)}"
+    if not joint.turns:
+        place = f"along {_numbers(joint.direction)}"
+    elif joint.advance:
+        place += f", {2e3 * np.pi * joint.advance:.4g} mm a turn"
+    over = "rad" if joint.turns else "m"
+    parts = [f"friction {joint.friction:g} {unit}"]
+    parts += [f"stiffness {joint.stiffness:g} {unit}/{over}"] if joint.stiffness else []
+    parts += [f"damping {joint.damping:g} {unit}·s/{over}"] if joint.damping else []
+    return f"on a {attached.kind} {place}; {', '.join(parts)}"
+
+
 def _palm(task: Task) -> str:
     palm = task.palm
     moves = "the program may move it" if palm.may_move else "moves as the task says" if palm.motion else "stands still"
@@ -143,7 +160,10 @@ def _goal(goal: Goal) -> str:
         if goal.rotation.degrees
         else "upright"
     )
-    return f"{_mm(goal.position or (0.0, 0.0, 0.0))}, {turn}"
+    pressed = ""
+    if goal.exert is not None:
+        pressed = f"; pressing with {_numbers(goal.exert.force)} N, {_numbers(goal.exert.torque)} N·m on the way"
+    return f"{_mm(goal.position or (0.0, 0.0, 0.0))}, {turn}{pressed}"
 
 
 def _world(task: Task) -> str:
