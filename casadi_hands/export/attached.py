@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 # s and relative: how stiffly a thread keeps its pitch, as stiff as MuJoCo's time step of 1 ms lets it be.
 _STIFF = {"solref": "0.002 1", "solimp": "0.99 0.999 0.0001"}
 
+# The object alone is light beside what drives it: regularised as usual, friction would give way to the fingers.
+_DRY = {"solreffriction": "0.004 1", "solimpfriction": "0.9999 0.9999 0.001"}
+
 
 def add_joints(body: Element, attached: Attached | None, motion: Motion) -> None:
     """Add the joint to the object's body, which stands as at the motion's first sample; a free one's is free.
@@ -36,6 +39,7 @@ def add_joints(body: Element, attached: Attached | None, motion: Motion) -> None
         "stiffness": number(joint.stiffness),
         "damping": number(joint.damping),
         "springref": number(0.0),
+        **_DRY,
     }
     where = {"pos": numbers(joint.pivot), "axis": numbers(joint.direction)}
     if attached.kind == "screw":

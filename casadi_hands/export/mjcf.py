@@ -134,9 +134,12 @@ def _add_settings(root: Element, task: Task) -> None:
     extent = 8 * task.object.characteristic_length
     center = task.palm.position
     SubElement(root, "statistic", extent=number(extent), center=numbers(center), meansize=number(extent / 20))
+    # Where forces are larger than weights, contacts are as much stiffer: they give as the square of this time, in s.
+    weight = task.object.mass * (float(np.linalg.norm(task.gravity)) or 9.81)
+    give = max(0.01 * float(np.sqrt(min(weight / task.force_unit, 1.0))), 2 * _TIME_STEP)
     geom = {
         "condim": "4",
-        "solref": "0.01 1",
+        "solref": f"{number(give)} 1",
         "solimp": f"0.9 0.95 {number(_SOFTNESS * task.object.characteristic_length)}",
     }
     SubElement(SubElement(root, "default"), "geom", geom)

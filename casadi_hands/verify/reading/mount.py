@@ -10,6 +10,8 @@ import numpy as np
 
 from casadi_hands.verify.reading.markup import number, numbers, strangers
 
+_ATTRIBUTES = "name type pos axis ref frictionloss stiffness damping springref solreffriction solimpfriction"
+
 
 @dataclass(frozen=True)
 class Mount:
@@ -35,7 +37,7 @@ def read_mount(path: Path, strange: list[str], element: Element) -> Mount:
     Raises:
         DesignError: a number is missing or is not finite.
     """
-    strange.extend(strangers(element, "", "name type pos axis ref frictionloss stiffness damping springref"))
+    strange.extend(strangers(element, "", _ATTRIBUTES))
     return Mount(
         name=element.get("name", ""),
         kind=element.get("type", "hinge"),
