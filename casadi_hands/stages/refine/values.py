@@ -151,15 +151,15 @@ class RefineValues:
     def start(self, motion: WholeHand) -> dict[str, Array]:
         """Values of all variables: the motion, with velocities and forces that nearly obey it."""
         count, chosen = self.knots, self.structure.columns
-        joint, twist = self.model.attachment, None
+        joint, freedom = self.model.attachment, None
         if joint is None:
             rates, wrenches = rates_and_wrenches(self.model, motion.position, motion.vector)
             moving = {"pose": np.hstack([motion.position, motion.vector]), "rate": rates}
         else:
-            twist = joint.twist
+            freedom = joint.twist
             moving, wrenches = along_joint(self.model, motion.position, motion.vector)
         points = motion.point[:, chosen]
-        forces = balanced(points, motion.force[:, chosen], self.bearing, wrenches, twist)
+        forces = balanced(points, motion.force[:, chosen], self.bearing, wrenches, freedom)
         values = {
             **moving,
             "point": points.reshape(count, -1),
@@ -179,7 +179,7 @@ class RefineValues:
         values["middle_torque"] = np.cross(at, pushing).sum(axis=1) + twisting
         if len(k := self.disturbed):
             pushed = self.model.unborne(disturbance_wrenches(self.model, motion.vector)[k].T).T
-            disturbed = balanced(points[k], forces[k], self._active[k], wrenches[k] - pushed, twist)
+            disturbed = balanced(points[k], forces[k], self._active[k], wrenches[k] - pushed, freedom)
             values["force_disturbed"] = disturbed.reshape(len(k), -1)
         for c, finger, angles in zip(self.structure.contacts, motion.fingers, motion.angles, strict=True):
             values[f"angles{c}"] = angles
