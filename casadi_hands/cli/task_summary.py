@@ -121,7 +121,7 @@ def _object(task: Task) -> str:
 
 def _joint(attached: Attached) -> str:
     joint, unit = attached.joint, "N·m" if attached.joint.turns else "N"
-    place = f"about {_numbers(joint.direction)} at {_mm(joint.pivot)}"
+    place = f"about {_numbers(joint.direction)} at {_mm(joint.pivot.tolist())}"
     if not joint.turns:
         place = f"along {_numbers(joint.direction)}"
     elif joint.advance:

@@ -25,6 +25,8 @@ _BETTER = "contacts that surround the object better or oppose each other"
 
 def grasp_findings(task: Task, model: Model) -> Iterator[Finding]:
     """What the contacts cannot hold, by least squares and linear programmes over the forces in their friction cones."""
+    if model.attachment is not None:  # which the world holds, and contacts need only move along its joint
+        return
     if model.contacts == 1:
         single = list(_single(task, model))
         if single:

@@ -151,6 +151,7 @@ def _balances(model: Model) -> Iterator[tuple[float, Array, Array, Array, Array,
         wrenches = model.unborne(wrenches)
         yield float(model.schedule.samples[each.sample]), each.force, each.torque, forces, wrenches, each.needed
 
+
 def _resisted(model: Model, ways: Array) -> Array:
     """What spring and friction of a joint ask for (S, 1), with weights (S, G) of the goals; 0 of a free object."""
     if model.attachment is None:

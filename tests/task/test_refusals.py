@@ -49,7 +49,7 @@ SPOILT = {
     "unknown field": (
         "mass: 0.1",
         "mass: 0.1\n  weight: 1",
-        "4: object.weight: given an unknown field; allowed: mass, shapes, center_of_mass, inertia, attached",
+        "4: object.weight: given an unknown field; allowed: mass, shapes, center_of_mass, inertia, attached, meshes",
     ),
     "misspelt field": (
         "  mass:",
