@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import pickle
-import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import Executor, Future, as_completed
 from contextlib import contextmanager
 from typing import Any, TypeVar
+
+from casadi_hands.execution.journal import Section
+from casadi_hands.execution.workers import LostCall, Workers
 
 Result = TypeVar("Result")
 _alone = threading.Lock()
@@ -25,14 +26,11 @@ def processes(jobs: int) -> Iterator[Executor | None]:
         return
     saved = {name: os.environ.get(name) for name in _THREADS}
     os.environ.update(dict.fromkeys(_THREADS, "1"))
+    workers = Workers(jobs)
     try:
-        context = multiprocessing.get_context("spawn")
-        # An interrupt is the parent's to handle: workers end with it, silently.
-        with ProcessPoolExecutor(
-            jobs, mp_context=context, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)
-        ) as executor:
-            yield executor
+        yield workers
     finally:
+        workers.stop()
         for name, value in saved.items():
             os.environ.pop(name, None) if value is None else os.environ.update({name: value})
 
@@ -59,26 +57,50 @@ def run_all(
     function: Callable[..., Result],
     arguments: Sequence[tuple[Any, ...]],
     done: Callable[[int, Result], None],
+    kept: Section | None = None,
+    name: Callable[[int], str] = "call {}".format,
 ) -> list[Result]:
     """Call a function on every tuple of arguments; results in that order, ``done(index, result)`` as they come.
 
     An error, also an interruption, cancels what has not begun.
+
+    Args:
+        executor: where they run; None for here.
+        function: what is called.
+        arguments: of each call.
+        done: told of each result.
+        kept: where results are kept as they come, and taken from where they are.
+        name: what a call is, by its index.
+
+    Raises:
+        LostCall: the processes that ran a call ended with it; the message names it.
     """
-    if executor is None:
-        results = []
-        for index, args in enumerate(arguments):
-            results.append(function(*args))
-            done(index, results[-1])
-        return results
-    futures: dict[Future[bytes], int] = {}
     collected: dict[int, Result] = {}
+
+    def collect(index: int, result: Result) -> None:
+        collected[index] = result
+        done(index, result)
+
+    for index in range(len(arguments)):
+        if kept is not None and kept.has(index):
+            collect(index, kept.get(index))
+    left = [index for index in range(len(arguments)) if index not in collected]
+    if executor is None:
+        for index in left:
+            result = function(*arguments[index])
+            collect(index, result if kept is None else kept.put(index, result))
+        return [collected[index] for index in range(len(arguments))]
+    futures: dict[Future[bytes], int] = {}
     try:
-        for index, args in enumerate(arguments):
-            futures[executor.submit(_called, pickle.dumps((function, args)))] = index
+        for index in left:
+            futures[executor.submit(_called, pickle.dumps((function, arguments[index])))] = index
         for future in as_completed(futures):
             index = futures[future]
-            collected[index] = pickle.loads(future.result())
-            done(index, collected[index])
+            try:
+                result = pickle.loads(future.result())
+            except LostCall as error:
+                raise LostCall(f"{name(index)}: {error}") from error
+            collect(index, result if kept is None else kept.put(index, result))
     except BaseException:
         for future in futures:
             future.cancel()

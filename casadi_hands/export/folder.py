@@ -12,6 +12,7 @@ from casadi_hands.export.commands import commanded
 from casadi_hands.export.meshes import FOLDER, mesh_files
 from casadi_hands.export.mjcf import scene_mjcf
 from casadi_hands.export.page.page import write_page
+from casadi_hands.export.place import remove_files, replace_folder, shown
 from casadi_hands.export.record import STATUSES, design_record, hand_from_record, record_text
 from casadi_hands.export.table import motion_table
 from casadi_hands.export.urdf import hand_urdf, object_urdf
@@ -19,24 +20,12 @@ from casadi_hands.problem.result import Result
 from casadi_hands.problem.stored import read_json
 from casadi_hands.task import load_task, task_to_yaml
 
-_FILES = (
-    "task.yaml",
-    "hand.urdf",
-    "object.urdf",
-    "scene.xml",
-    "motion.npz",
-    "motion.csv",
-    "placement.json",
-    "result.json",
-    "viewer.html",
-)
-
 
 def save_design(design: Result, directory: Path, page: bool = True) -> None:
     """Write a design's folder; of a partial design, the files for which there is something to write.
 
-    Files of an earlier design in the folder are replaced or removed. ``result.json`` comes last, so a folder that has
-    one is complete.
+    They are written beside it and moved into place together: whoever reads the folder meanwhile finds an earlier design
+    whole, or this one. Files of an earlier design are replaced or removed.
 
     Args:
         design: whole or partial (hand or motion None).
@@ -44,19 +33,28 @@ def save_design(design: Result, directory: Path, page: bool = True) -> None:
         page: write the viewer and the motion as a table too, which takes longer than all the rest.
 
     Raises:
-        DesignError: the folder cannot be written, or the design holds what cannot be.
+        DesignError: the folder cannot be written, another process writes it, or the design holds what cannot be.
+    """
+    try:
+        replace_folder(directory, lambda made: write_files(design, made, page))
+    except OSError as error:
+        raise DesignError(f"{shown(directory)}: cannot write the design here: {error.strerror or error}") from error
+
+
+def write_files(design: Result, directory: Path, page: bool = True) -> None:
+    """Write a design's files into a folder that nobody reads meanwhile.
+
+    Args:
+        design: as for `save_design`.
+        directory: exists.
+        page: as for `save_design`.
+
+    Raises:
+        DesignError: the design holds what cannot be written.
+        OSError: the files cannot be written.
     """
     if design.status not in STATUSES:
         raise DesignError(f"a design's status is one of {', '.join(STATUSES)}, not {design.status!r}")
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-        _remove(directory)
-        _write(design, directory, page)
-    except OSError as error:
-        raise DesignError(f"{directory}: cannot write the design here: {error}") from error
-
-
-def _write(design: Result, directory: Path, page: bool) -> None:
     motion = design.motion
     texts = {"task.yaml": task_to_yaml(design.task), "object.urdf": object_urdf(design.task)}
     if design.hand is not None:
@@ -81,18 +79,6 @@ def _write(design: Result, directory: Path, page: bool) -> None:
     (directory / "result.json").write_text(record_text(design_record(design)), encoding="utf-8")
 
 
-def _remove(directory: Path) -> None:
-    """Remove a design's files and meshes."""
-    for name in _FILES:
-        (directory / name).unlink(missing_ok=True)
-    meshes = directory / FOLDER
-    if meshes.is_dir():
-        for path in meshes.glob("object*.obj"):
-            path.unlink()
-        if not any(meshes.iterdir()):
-            meshes.rmdir()
-
-
 def remove_design(directory: Path) -> None:
     """Remove a design's files, and the folder if it holds nothing else.
 
@@ -103,7 +89,7 @@ def remove_design(directory: Path) -> None:
         DesignError: the files cannot be removed.
     """
     try:
-        _remove(directory)
+        remove_files(directory)
         if directory.is_dir() and not any(directory.iterdir()):
             directory.rmdir()
     except OSError as error:

@@ -19,7 +19,7 @@ from casadi_hands.diagnosis.figures import (
 )
 from casadi_hands.diagnosis.reason import Reason, format_reasons
 from casadi_hands.export.design import Design
-from casadi_hands.export.folder import save_design
+from casadi_hands.export.folder import write_files
 from casadi_hands.problem.floating_motion import Floating
 from casadi_hands.problem.hand import Hand
 from casadi_hands.problem.model import Model
@@ -62,10 +62,11 @@ class Judge:
     Args:
         model: the task.
         floating: the motion that all of its hands follow.
+        scratch: folder for files that are judged; the system's by default.
     """
 
-    def __init__(self, model: Model, floating: Floating) -> None:
-        self.model, self.floating = model, floating
+    def __init__(self, model: Model, floating: Floating, scratch: Path | None = None) -> None:
+        self.model, self.floating, self.scratch = model, floating, scratch
         self._last: tuple[Hand | None, Motion | None, Audit] | None = None
 
     @cached_property
@@ -100,8 +101,8 @@ class Judge:
             design: judged before.
             jobs: processes for the replays.
         """
-        with tempfile.TemporaryDirectory() as files:
-            save_design(design, Path(files), page=False)
+        with tempfile.TemporaryDirectory(dir=self.scratch) as files:
+            write_files(design, Path(files), page=False)
             tried = run_replays(files, jobs=jobs)
         figures = {figure.name: figure for figure in tried.figures()}
         seen = Audit(design.task.name, figures, ())
@@ -119,16 +120,16 @@ class Judge:
         judged = design if design.replays else self.replayed(design, jobs)
         if not judged.missed_in_replays or judged.missed != judged.missed_in_replays:
             return judged
-        with tempfile.TemporaryDirectory() as files:
-            save_design(judged, Path(files), page=False)
+        with tempfile.TemporaryDirectory(dir=self.scratch) as files:
+            write_files(judged, Path(files), page=False)
             remedy = motor_remedy(files, judged)
         return judged if remedy is None else replace(judged, reason=f"{judged.reason}. {remedy}")
 
     def audited(self, design: Design) -> Audit:
         """What the audit finds in a design's files; of the same hand and motion as the last time, what it found."""
         if self._last is None or self._last[0] is not design.hand or self._last[1] is not design.motion:
-            with tempfile.TemporaryDirectory() as scratch:
-                save_design(design, Path(scratch), page=False)
+            with tempfile.TemporaryDirectory(dir=self.scratch) as scratch:
+                write_files(design, Path(scratch), page=False)
                 found = audit_files(scratch)
             # How many motors are asked for is counted at last: a hand with more is where fewer are looked for from.
             if "motors" in found.figures:

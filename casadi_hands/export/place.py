@@ -1,0 +1,301 @@
+"""Folders that are written beside and moved into place, by one process at a time.
+
+Beside a folder ``NAME`` stands ``.NAME.solve`` while somebody works for it: with a lock, which the kernel frees when the
+process ends, with what is being written, and with whatever else its owner keeps there. Where no folder can be made
+beside it (a mount point, a parent that is read-only), it stands within as ``.solve``.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+import fcntl
+import hashlib
+import os
+import shutil
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from itertools import count
+from pathlib import Path
+
+from casadi_hands.errors import DesignError
+from casadi_hands.export.meshes import FOLDER
+
+LAST = "result.json"
+"""The file that makes a folder complete."""
+
+FILES = (
+    "task.yaml",
+    "hand.urdf",
+    "object.urdf",
+    "scene.xml",
+    "motion.npz",
+    "motion.csv",
+    "placement.json",
+    LAST,
+    "viewer.html",
+)
+"""A design's files; whatever else is in its folder stays there."""
+
+_MESHES = "object*.obj"
+_LOCK, _NEXT = "lock", "next-"
+_LONGEST = 200  # bytes of a folder's name that are in that of the one beside it
+_AT_FDCWD = -100
+_EXCHANGE = 2  # RENAME_EXCHANGE of Linux, RENAME_SWAP of macOS
+_NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP}
+_owned: dict[Path, Path] = {}
+_numbers = count()
+
+
+def resolved(directory: Path) -> Path:
+    """The folder itself, whatever links lead to it.
+
+    Raises:
+        DesignError: no folder can have this name.
+    """
+    try:
+        found = directory.resolve()
+        if os.path.lexists(found) and not found.is_dir():
+            raise DesignError(f"{shown(directory)}: cannot write the design here: it is a file")
+        with suppress(FileNotFoundError):
+            found.stat()
+    except (OSError, RuntimeError, ValueError) as error:
+        raise DesignError(f"{shown(directory)}: cannot write the design here: {_why(error)}") from error
+    return found
+
+
+def beside(directory: Path) -> Path:
+    """Where one works for a folder: beside it, or within it where nothing can be made beside it."""
+    if directory.is_dir() and (os.path.ismount(directory) or not os.access(directory.parent, os.W_OK)):
+        return directory / ".solve"
+    name = directory.name
+    if len(name.encode()) > _LONGEST:
+        name = f"{name[:40]}-{hashlib.sha256(name.encode()).hexdigest()[:16]}"
+    return directory.parent / f".{name}.solve"
+
+
+@contextmanager
+def owned(directory: Path) -> Iterator[Path]:
+    """Be the only process that writes a folder, and have a place beside it, which is removed unless it is used.
+
+    Leftovers of a process that was killed while it wrote are cleared away. A process that owns a folder may own it
+    again.
+
+    Args:
+        directory: need not exist.
+
+    Yields:
+        The place: a folder.
+
+    Raises:
+        DesignError: another process writes it, or it cannot be written.
+    """
+    directory = resolved(directory)
+    if directory in _owned:
+        yield _owned[directory]
+        return
+    place = beside(directory)
+    try:
+        lock = _locked(directory, place)
+    except OSError as error:
+        raise DesignError(f"{shown(directory)}: cannot write the design here: {_why(error)}") from error
+    _owned[directory] = place
+    try:
+        _clear(place, directory)
+        yield place
+    finally:
+        del _owned[directory]
+        _release(place)
+        os.close(lock)
+
+
+def _locked(directory: Path, place: Path) -> int:
+    """The file that is locked, open."""
+    if directory.is_dir() and not os.access(directory, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    while True:
+        place.mkdir(parents=True, exist_ok=True)
+        file = os.open(place / _LOCK, os.O_RDWR | os.O_CREAT, 0o644)
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            # Who has just left may have removed it.
+            if os.path.samestat(os.fstat(file), os.stat(place / _LOCK)):
+                os.ftruncate(file, 0)
+                os.write(file, f"{os.getpid()}\n".encode())
+                return file
+        except BlockingIOError:
+            with suppress(OSError):
+                other = os.read(file, 20).decode(errors="replace").strip()
+            os.close(file)
+            who = f" (process {other})" if other.isdigit() else ""
+            raise DesignError(
+                f"{directory}: another solve{who} is writing here; wait for it, or give another folder (--out)"
+            ) from None
+        except FileNotFoundError:
+            pass
+        except OSError as error:
+            if error.errno in _NO_LOCKS:  # as some file systems of networks have none
+                return file
+            os.close(file)
+            raise
+        os.close(file)
+
+
+def _clear(place: Path, directory: Path) -> None:
+    """Clear away what a process that was killed was writing."""
+    for each in place.iterdir():
+        if each.name.startswith(_NEXT):
+            _remove(each, directory)
+
+
+def _release(place: Path) -> None:
+    """Remove the place if nothing else is in it."""
+    with suppress(OSError):
+        if {each.name for each in place.iterdir()} == {_LOCK}:
+            (place / _LOCK).unlink()
+            place.rmdir()
+
+
+def replace_folder(directory: Path, write: Callable[[Path], None]) -> None:
+    """Write a design's files so that whoever reads them finds all of the old ones or all of the new ones.
+
+    Where the file system cannot exchange folders, there is a moment without ``LAST``: with nothing complete.
+
+    Args:
+        directory: made if it does not exist.
+        write: writes the new files into the folder that it is given.
+
+    Raises:
+        DesignError: another process writes there.
+        OSError: it cannot be written; it is as it was then.
+    """
+    directory = resolved(directory)
+    with owned(directory) as place:
+        made = place / f"{_NEXT}{next(_numbers)}"
+        made.mkdir()
+        try:
+            write(made)
+            for each in made.rglob("*"):
+                if each.is_file():
+                    _to_disk(each)
+            if not directory.exists():
+                os.rename(made, directory)
+                return
+            shutil.copymode(directory, made)
+            try:
+                if place.parent == directory:
+                    raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))
+                _exchange(made, directory)
+            except OSError:
+                _move_files(made, directory)
+        finally:
+            _remove(made, directory)
+
+
+def replace_file(path: Path, write: Callable[[Path], None]) -> None:
+    """Write one file so that whoever reads it finds the old one or the new one, whole.
+
+    Args:
+        path: the file.
+        write: writes the new one to the path that it is given.
+
+    Raises:
+        OSError: it cannot be written; the old one stays.
+    """
+    made = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        write(made)
+        _to_disk(made)
+        os.replace(made, path)
+    finally:
+        made.unlink(missing_ok=True)
+
+
+def remove_files(directory: Path) -> None:
+    """Remove a design's files from a folder, and the meshes that it has of the object.
+
+    Raises:
+        OSError: they cannot be removed.
+    """
+    for name in (LAST, *FILES):
+        (directory / name).unlink(missing_ok=True)
+    meshes = directory / FOLDER
+    if meshes.is_dir():
+        for path in meshes.glob(_MESHES):
+            path.unlink()
+        if not any(meshes.iterdir()):
+            meshes.rmdir()
+
+
+def _remove(made: Path, directory: Path) -> None:
+    """Remove a folder that was being written, or the old one that was exchanged for it.
+
+    Args:
+        made: the folder.
+        directory: where what is not of a design goes, if it is not there yet.
+    """
+    if not made.is_dir():
+        made.unlink(missing_ok=True)
+        return
+    remove_files(made)
+    if directory.is_dir():
+        _move_into(made, directory)
+    shutil.rmtree(made, ignore_errors=True)
+
+
+def _move_into(source: Path, target: Path) -> None:
+    """Move what is in one folder into another that has none of that name; folders that both have, likewise."""
+    for each in source.iterdir():
+        there = target / each.name
+        if not os.path.lexists(there):
+            os.rename(each, there)
+        elif each.is_dir() and there.is_dir() and not there.is_symlink():
+            _move_into(each, there)
+
+
+def _move_files(made: Path, directory: Path) -> None:
+    """Move files one by one, the one that makes the folder complete last."""
+    (directory / LAST).unlink(missing_ok=True)
+    remove_files(directory)
+    last = made.with_name(f"{made.name}.{LAST}")
+    os.rename(made / LAST, last)
+    _move_into(made, directory)
+    os.rename(last, directory / LAST)
+
+
+def _exchange(one: Path, other: Path) -> None:
+    """Let two folders change places in one step.
+
+    Raises:
+        OSError: the file system or the kernel cannot.
+    """
+    libc = ctypes.CDLL(None, use_errno=True)
+    paths = os.fsencode(one), os.fsencode(other)
+    try:
+        if sys.platform == "darwin":
+            failed = libc.renamex_np(*paths, ctypes.c_uint(_EXCHANGE))
+        else:
+            failed = libc.renameat2(_AT_FDCWD, paths[0], _AT_FDCWD, paths[1], ctypes.c_uint(_EXCHANGE))
+    except AttributeError as error:
+        raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS)) from error
+    if failed:
+        number = ctypes.get_errno()
+        raise OSError(number, os.strerror(number))
+
+
+def _to_disk(file: Path) -> None:
+    """Have a file written out: some file systems say only then that there is no room."""
+    with file.open("rb") as opened:
+        os.fsync(opened.fileno())
+
+
+def shown(directory: Path) -> str:
+    """A path for a message, long ones cut short."""
+    text = str(directory)
+    return text if len(text) <= 120 else f"{text[:60]}…{text[-40:]}"
+
+
+def _why(error: Exception) -> str:
+    """What the system says, without the path, which may be long."""
+    return (isinstance(error, OSError) and error.strerror) or str(error)
