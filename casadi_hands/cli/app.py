@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-from contextlib import ExitStack
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
@@ -43,11 +42,16 @@ def options(
 
 @app.command()
 def solve(
-    task: TaskFile,
+    task: Annotated[
+        Path | None,
+        typer.Argument(metavar="TASK", help="A task file (YAML); none with --resume.", show_default=False),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
-            help="Folder to write; files of an earlier design in it are replaced.", show_default="results/TASK"
+            help="Folder to write. A result in it makes way for a better one of the same task only, a certified one or "
+            "one of another task only with --force.",
+            show_default="results/TASK",
         ),
     ] = None,
     seed: Seed = None,
@@ -81,71 +85,29 @@ def solve(
         ),
     ] = None,
     until: Annotated[Stage, typer.Option(help="Stop after this stage and write what there is.")] = Stage.REFINE,
+    force: Annotated[
+        bool, typer.Option("--force", help="Replace whatever result is in the folder, once there is another.")
+    ] = False,
+    resume: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Go on with the solve into DIR that was stopped, from the last trial or refinement that it had "
+            "finished, with its task and options and to the same design.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Design a hand for a task.
 
     Exits 0 when there is a design that does the task (or all that --until asked for), 1 when there is none, 2 when
-    the task cannot be used. What has been computed is written after every stage, so stopping it (Ctrl-C) loses little.
+    the task cannot be used. What has been computed is written after every stage, and what has been finished is kept
+    beside the folder, so that stopping it (Ctrl-C) loses nothing: --resume goes on from there.
     """
-    from casadi_hands.cli.interrupt import leave_on_interrupt
-    from casadi_hands.cli.progress import Reporter
-    from casadi_hands.cli.summary import alternatives_summary, design_summary
-    from casadi_hands.task.loader import load_questioned
+    from casadi_hands.cli.solving import Asked, solve_and_tell
 
-    if start is not None and (seeds > 1 or until is not Stage.REFINE):
-        raise typer.BadParameter(
-            "one hand is refined, to the end: give neither --seeds nor --until", param_hint="--from"
-        )
-    problem, questions = load_questioned(task)
-    folder = out or Path("results") / task.stem
-    reporter = Reporter(Console(stderr=True), questions)
-
-    def stopped() -> None:
-        reporter.stop()
-        # Written last, so a folder that has it is complete.
-        complete = any(folder.glob("result.json")) or any(folder.glob("alternatives/*/result.json"))
-        reporter.note(f"stopped; {f'what was computed is in {folder}' if complete else 'no stage was complete'}")
-
-    with leave_on_interrupt(stopped), reporter, ExitStack() as stack:
-        # Within the reporter, because CasADi and Pinocchio take seconds to load.
-        import casadi_hands.pipeline as pipeline
-        from casadi_hands.execution.cluster import cluster
-        from casadi_hands.pipeline import alternatives
-
-        workers = stack.enter_context(cluster(executor)) if executor else None
-        if seeds > 1:
-            first = problem.search.seed if seed is None else seed
-            ranked = alternatives.explore(
-                problem,
-                seeds=range(first, first + seeds),
-                jobs=jobs,
-                until=until.value,
-                out=folder,
-                executor=workers,
-                progress=reporter.progress,
-            )
-            design = ranked[0].design
-        else:
-            ranked = []
-            if start is None:
-                alternatives.remove_alternatives(folder)
-            design = pipeline.solve(
-                problem,
-                seed=seed,
-                jobs=jobs,
-                until=until.value,
-                out=folder,
-                start=start,
-                executor=workers,
-                progress=reporter.progress,
-            )
-            if start is not None:  # which may have been one of them
-                alternatives.remove_alternatives(folder)
-    console = Console()
-    console.print(design_summary(design, folder))
-    if ranked:
-        console.print(alternatives_summary(ranked, folder))
-    raise typer.Exit(1 if design.status == "failed" else 0)
+    asked = Asked(task, out, seed, seeds, start, jobs, executor, until.value, force, resume)
+    raise typer.Exit(solve_and_tell(asked))
 
 
 @app.command()

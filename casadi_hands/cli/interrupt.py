@@ -1,21 +1,24 @@
-"""Ctrl-C during a solve."""
+"""Ctrl-C during a solve, and other signals that ask a program to end."""
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+from casadi_hands.lifetime import end_children, remove_scratch
+
 STOPPED = 130
 """Exit status of a program that SIGINT ended, as shells have it."""
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 @contextmanager
 def leave_on_interrupt(last_words: Callable[[], None]) -> Iterator[None]:
-    """End the program, and the processes it started, as soon as the user asks for it.
+    """End the program, the processes it started and its temporary folders as soon as somebody asks for it.
 
     A KeyboardInterrupt would be late: on its way out it waits for what other processes are at. It is left to programs
     that use the package (`Solver.solve` raises what CasADi swallows while IPOPT runs).
@@ -24,19 +27,27 @@ def leave_on_interrupt(last_words: Callable[[], None]) -> Iterator[None]:
         last_words: called before the end.
     """
 
-    def leave(_signal: int, _frame: FrameType | None) -> None:
+    def leave(number: int, _frame: FrameType | None) -> None:
         # A second Ctrl-C shall not interrupt the leaving.
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        for child in multiprocessing.active_children():
-            child.terminate()
-        last_words()
-        # An exception would not leave IPOPT as itself, and would wait like the other one.
-        os._exit(STOPPED)
+        for each in _SIGNALS:
+            signal.signal(each, signal.SIG_IGN)
+        try:
+            end_children()
+            remove_scratch()
+            last_words()
+        finally:
+            # An exception would not leave IPOPT as itself, and would wait like the other one.
+            os._exit(128 + number)
 
     # Leaving at once leaves semaphores to Python's resource tracker, which clears them away, but complains.
     os.environ.setdefault("PYTHONWARNINGS", "ignore:resource_tracker:UserWarning")
-    before = signal.signal(signal.SIGINT, leave)
+    before = {each: signal.getsignal(each) for each in _SIGNALS}
+    for each in _SIGNALS:
+        # What a shell runs in the background, or under nohup, ignores some of them.
+        if each == signal.SIGINT or before[each] is not signal.SIG_IGN:
+            signal.signal(each, leave)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for each, handler in before.items():
+            signal.signal(each, handler)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from casadi_hands.errors import SolveError
-from casadi_hands.execution.stored import NotStored, pack, unpack
+from casadi_hands.execution.stored import NotStoredError, pack, unpack
 
 Result = TypeVar("Result")
 
@@ -69,7 +69,7 @@ class Section:
             return False
         try:
             name, value = unpack(path.read_bytes())
-        except (OSError, NotStored, TypeError, ValueError):
+        except (OSError, NotStoredError, TypeError, ValueError):
             return False
         if name != self._name:
             return False

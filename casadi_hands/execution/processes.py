@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from casadi_hands.execution.journal import Section
-from casadi_hands.execution.workers import LostCall, Workers
+from casadi_hands.execution.workers import LostCallError, Workers
 
 Result = TypeVar("Result")
 _alone = threading.Lock()
@@ -73,7 +73,7 @@ def run_all(
         name: what a call is, by its index.
 
     Raises:
-        LostCall: the processes that ran a call ended with it; the message names it.
+        LostCallError: the processes that ran a call ended with it; the message names it.
     """
     collected: dict[int, Result] = {}
 
@@ -98,8 +98,8 @@ def run_all(
             index = futures[future]
             try:
                 result = pickle.loads(future.result())
-            except LostCall as error:
-                raise LostCall(f"{name(index)}: {error}") from error
+            except LostCallError as error:
+                raise LostCallError(f"{name(index)}: {error}") from error
             collect(index, result if kept is None else kept.put(index, result))
     except BaseException:
         for future in futures:

@@ -21,7 +21,7 @@ _TREE = "tree"
 _LARGEST = 2**30  # bytes, unpacked: a solve's units have millions at most
 
 
-class NotStored(ValueError):
+class NotStoredError(ValueError):
     """Bytes that are not a stored value, or one that this version does not know."""
 
 
@@ -48,7 +48,7 @@ def unpack(data: bytes) -> Any:
     """The value that was packed.
 
     Raises:
-        NotStored: it cannot be read.
+        NotStoredError: it cannot be read.
     """
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
@@ -70,7 +70,7 @@ def unpack(data: bytes) -> Any:
         MemoryError,
         zipfile.BadZipFile,
     ) as error:
-        raise NotStored(f"not a stored value: {error}") from error
+        raise NotStoredError(f"not a stored value: {error}") from error
 
 
 class _Packer:

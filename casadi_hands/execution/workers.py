@@ -26,7 +26,7 @@ _TICK = 1.0
 _Call = tuple[Future[Any], Callable[..., Any], tuple[Any, ...]]
 
 
-class LostCall(SolveError):
+class LostCallError(SolveError):
     """A call that no process has brought to an end; the message says how it went, not which it was."""
 
 
@@ -105,7 +105,7 @@ class Workers(Executor):
         worker.stop()
 
     def _run(self, worker: _Worker, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
-        ends = []
+        ends: list[str] = []
         while len(ends) < ATTEMPTS and not self._closed:
             ended = worker.run(function, arguments, self._longest)
             if ended is None:
@@ -115,9 +115,9 @@ class Workers(Executor):
                 break
             worker.start()
             if ended == _HANGING:
-                raise LostCall(f"it did not end in {self._longest / 60:.3g} min and was stopped")
+                raise LostCallError(f"it did not end in {self._longest / 60:.3g} min and was stopped")
         times = f" each of {ATTEMPTS} times" if len(ends) == ATTEMPTS else ""
-        raise LostCall(f"the process that ran it ended{times}: {ends[-1] if ends else 'stopped'}")
+        raise LostCallError(f"the process that ran it ended{times}: {ends[-1] if ends else 'stopped'}")
 
 
 _HANGING = "hangs"

@@ -1,7 +1,7 @@
 """Folders that are written beside and moved into place, by one process at a time.
 
-Beside a folder ``NAME`` stands ``.NAME.solve`` while somebody works for it: with a lock, which the kernel frees when the
-process ends, with what is being written, and with whatever else its owner keeps there. Where no folder can be made
+Beside a folder ``NAME`` stands ``.NAME.solve`` while somebody works for it: with a lock, which the kernel frees when
+the process ends, with what is being written, and with whatever else its owner keeps there. Where no folder can be made
 beside it (a mount point, a parent that is read-only), it stands within as ``.solve``.
 """
 
@@ -110,6 +110,19 @@ def owned(directory: Path) -> Iterator[Path]:
         os.close(lock)
 
 
+def leave_owned(keep: Callable[[Path], None]) -> None:
+    """Clear away what this process was writing, because it ends at once.
+
+    Args:
+        keep: told of each place of a folder that is owned; decides what stays in it.
+    """
+    for directory, place in _owned.items():
+        with suppress(OSError):
+            _clear(place, directory)
+            keep(place)
+            _release(place)
+
+
 def _locked(directory: Path, place: Path) -> int:
     """The file that is locked, open."""
     if directory.is_dir() and not os.access(directory, os.W_OK):
@@ -157,7 +170,7 @@ def _release(place: Path) -> None:
             place.rmdir()
 
 
-def replace_folder(directory: Path, write: Callable[[Path], None]) -> None:
+def replace_folder(directory: Path, write: Callable[[Path], object]) -> None:
     """Write a design's files so that whoever reads them finds all of the old ones or all of the new ones.
 
     Where the file system cannot exchange folders, there is a moment without ``LAST``: with nothing complete.
@@ -193,7 +206,7 @@ def replace_folder(directory: Path, write: Callable[[Path], None]) -> None:
             _remove(made, directory)
 
 
-def replace_file(path: Path, write: Callable[[Path], None]) -> None:
+def replace_file(path: Path, write: Callable[[Path], object]) -> None:
     """Write one file so that whoever reads it finds the old one or the new one, whole.
 
     Args:

@@ -62,7 +62,7 @@ def place(task: Task, record: Record, executor: Executor | None) -> tuple[list[T
     with record.stage("placement", f"contacts for {len(task.fingers)} fingers, by statics"):
         proposal = propose(task)
         tasks = [each.in_task(task) for each in proposal.sets]
-        done = 0
+        done, kept = 0, record.journal.section("sets of contacts")
 
         def tell(index: int, tried: Tried) -> None:
             nonlocal done
@@ -70,7 +70,7 @@ def place(task: Task, record: Record, executor: Executor | None) -> tuple[list[T
             record.log("placement", f"set {index + 1}, {done} of {len(tasks)}: {_tried_words(tried)}")
 
         tried = (
-            run_all(executor, try_contacts, [(each,) for each in tasks], tell)
+            run_all(executor, try_contacts, [(each,) for each in tasks], tell, kept, "set {} of contacts".format)
             if len(tasks) > 1
             else [Tried()] * len(tasks)
         )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -11,8 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from casadi_hands.diagnosis.reason import Reason
+from casadi_hands.execution.journal import Journal
 from casadi_hands.export.design import Design
 from casadi_hands.nlp import Solution, SolverError
+from casadi_hands.pipeline.keeper import Keeper
+from casadi_hands.pipeline.rank import rank_of
 from casadi_hands.task import Task
 from casadi_hands.terms.catalogue import single
 from casadi_hands.terms.own import OwnTerm
@@ -36,27 +38,6 @@ class Progress:
 
 
 STOPPED = "it was stopped before fewer motors were looked for"
-AIM = 3.0  # deg from any goal in the replay as planned, beyond which more is tried
-
-
-def rank_of(design: Design) -> tuple[float, ...]:
-    """How far a judged design is from what is aimed at, best first.
-
-    By limits that the files miss, limits that replays miss, motors where joints share them, drops, turns from goals
-    beyond `AIM`, and the stiffness that the grasp asks for.
-    """
-    in_replays = design.missed_in_replays
-    missed = len(design.missed) - len(in_replays)
-    played = (math.inf, math.inf, math.inf, math.inf)
-    if design.drops is not None:
-        played = len(in_replays), _motors(design), design.drops, max(design.replay_angle, AIM)
-    stiffness = design.certificate.get("least_stiffness", {}).get("value")
-    return missed, *played, math.inf if stiffness is None else stiffness
-
-
-def _motors(design: Design) -> float:
-    """How many motors share the joints: fewer than these is what was asked for."""
-    return math.inf if design.hand is None or design.hand.drive is None else design.hand.motors
 
 
 class Record:
@@ -64,19 +45,25 @@ class Record:
 
     Args:
         task: as solved.
-        out: folder that is written on ``keep``, or None.
+        out: folder that is written on ``keep``, or what writes it; or None.
         report: told what is being done.
         own_terms: costs and constraints that a person adds to those of the stages.
+        journal: where finished units of work are kept; by default none are.
+        scratch: folder for temporary files; the system's by default.
     """
 
     def __init__(
         self,
         task: Task,
-        out: Path | None,
+        out: Path | Keeper | None,
         report: Callable[[Progress], None],
         own_terms: tuple[OwnTerm, ...] = (),
+        journal: Journal | None = None,
+        scratch: Path | None = None,
     ) -> None:
-        self.task, self.out, self.report, self.own_terms = task, out, report, own_terms
+        self.task, self.report, self.own_terms = task, report, own_terms
+        self.keeper = out if isinstance(out, Keeper) else Keeper(out)
+        self.journal, self.scratch = journal or Journal(), scratch
         self.started = time.perf_counter()
         self.design = Design(task=task, status="failed", reason="nothing has been computed yet")
         self._best: tuple[tuple[float, ...], Design] | None = None
@@ -90,7 +77,8 @@ class Record:
             placement: what is told of that.
             written: whether designs are written as they grow.
         """
-        record = Record(task, self.out if written else None, self.report, self.own_terms)
+        keeper = self.keeper if written else None
+        record = Record(task, keeper, self.report, self.own_terms, self.journal, self.scratch)
         record.started = self.started
         record.update(task=task, placement=placement, seconds=dict(self.design.seconds))
         return record
@@ -177,9 +165,13 @@ class Record:
         why = f"the solve broke off: {error}; another seed may not"
         return replace(self.design, status="failed", reason=why)
 
-    def keep(self, design: Design) -> Design:
-        """Complete a design and write it, if there is a place for it."""
+    def keep(self, design: Design, last: bool = False) -> Design:
+        """Complete a design and write it, if there is a place for it and nothing better in it.
+
+        Args:
+            design: of this solve.
+            last: whether no other follows.
+        """
         design = self.complete(design)
-        if self.out is not None:
-            design.save(self.out)
+        self.keeper.keep(design, last)
         return design

@@ -13,7 +13,8 @@ from casadi_hands.diagnosis.refinement import own_reasons, refined_reason
 from casadi_hands.export.design import Design
 from casadi_hands.pipeline.judge import Judge
 from casadi_hands.pipeline.margins import SMALL, margins_for
-from casadi_hands.pipeline.record import AIM, Record, rank_of
+from casadi_hands.pipeline.rank import AIM, rank_of
+from casadi_hands.pipeline.record import Record
 from casadi_hands.pipeline.steps import adopt
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
@@ -162,7 +163,7 @@ class Refiner:
 
     def _attempt(self, whole: WholeHand, margin: Margin, refine: Callable[..., Refined]) -> Refined:
         """Refine with one margin, and record all solves, acceptable or not."""
-        result = refine(margin=margin)
+        result = self.record.journal.once("a hand refined", lambda: refine(margin=margin))
         runs = []
         for step, solution, kept in result.runs:
             what = f"hand, {kept.friction:g} of the friction and {kept.normal_force:g} weights of normal force"

@@ -16,19 +16,25 @@ from casadi_hands.diagnosis.shortcoming import shortcoming_reason
 from casadi_hands.errors import SolveError
 from casadi_hands.execution.processes import processes, start_up
 from casadi_hands.export.design import Design
+from casadi_hands.export.place import owned
 from casadi_hands.export.record import STATUSES
 from casadi_hands.nlp import SolverError
 from casadi_hands.pipeline.certify import Certifier
 from casadi_hands.pipeline.couplings import Coupler
 from casadi_hands.pipeline.judge import Judge, counted
 from casadi_hands.pipeline.placing import ATTEMPTS, place, placed_like, unplaceable
-from casadi_hands.pipeline.record import STAGES, Progress, Record, rank_of
+from casadi_hands.pipeline.rank import rank_of
+from casadi_hands.pipeline.record import STAGES, Progress, Record
 from casadi_hands.pipeline.refiner import Refiner
+from casadi_hands.pipeline.solving import solving
 from casadi_hands.pipeline.steps import adopt, prepare_search, run_floating, run_search, run_whole_hand
+from casadi_hands.pipeline.unfinished import Request, request_hash
 from casadi_hands.pipeline.warm_start import as_floating, kept_margin, warm_start
+from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.si import build_model
 from casadi_hands.stages.own_terms import try_out
+from casadi_hands.stages.refine.values import Margin
 from casadi_hands.task import Task
 from casadi_hands.terms.own import OwnTerm, checked
 from casadi_hands.verify.replays.simulation import load_mujoco
@@ -47,6 +53,8 @@ def solve(
     executor: Executor | None = None,
     progress: Callable[[Progress], None] | None = None,
     terms: Sequence[OwnTerm] = (),
+    force: bool = False,
+    resume: bool = False,
 ) -> Design:
     """Design a hand for a task.
 
@@ -55,14 +63,18 @@ def solve(
         seed: of the search, in place of the task's.
         jobs: processes for the trials; all cores by default. The design does not depend on it.
         until: the last stage to run.
-        out: folder that is written after every stage, so that nothing computed is lost.
+        out: folder that is written after every stage, so that nothing computed is lost. A result in it makes way for a
+            better one of the same task only.
         start: folder of an earlier result of nearly the same task. Its hand and motion are refined for the task as it
             is now; only where that gives no certified hand are all stages run, and the better of both is kept.
         executor: where trials run, in place of processes on this machine; the design does not depend on it. One thread
             of a process runs a trial at a time, so threads gain nothing. ``jobs`` is then for the replays only.
         progress: told what is being done.
         terms: costs and constraints of your own, ``casadi_hands.Cost`` and ``casadi_hands.Bound``. What their residuals
-            raise is raised.
+            raise is raised. Of such a solve nothing is kept to go on from.
+        force: let the design take the place of whatever result is in ``out``, once it is there.
+        resume: go on from what was finished of a solve into ``out`` that was stopped, asked for the same. The design
+            is that of a solve that was not stopped.
 
     Returns:
         The design; its status is earned by the audit of what is written. Where a solver breaks off on the way, it is
@@ -71,14 +83,18 @@ def solve(
 
     Raises:
         SolveError: ``until`` is not a stage, or not the last where there is a start; or the start is of a task of
-            another structure; or one of ``terms`` cannot be used.
-        DesignError: there is no result in ``start``.
+            another structure; or one of ``terms`` cannot be used; or there is nothing to resume; or processes that ran
+            a trial were lost with it.
+        DesignError: there is no result in ``start``; or ``out`` cannot be written, is written by another process, or
+            holds a result that is certified, or of another task, and is not to be replaced.
         HandsError: MuJoCo, which designs are replayed in, cannot be loaded.
     """
     if until not in STAGES:
         raise SolveError(f"until: given {until!r}; allowed: {', '.join(STAGES)}")
     if start is not None and until != STAGES[-1]:
         raise SolveError(f"from an earlier result only the stage {STAGES[-1]} is run; it cannot stop after {until}")
+    if resume and (out is None or terms):
+        raise SolveError("only a solve that writes a folder (out), without terms of its own, can be resumed")
     if seed is not None:
         task = task.model_copy(update={"search": task.search.model_copy(update={"seed": seed})})
     own_terms = checked(terms)
@@ -89,22 +105,34 @@ def solve(
                 f"{start}: the earlier result has no contacts that were placed for what this task asks of its fingers; "
                 "solving without --from works"
             )
+    jobs, report = jobs or os.cpu_count() or 1, progress or (lambda _: None)
+    with nullcontext() if out is None else owned(out) as place:
+        if out is None or place is None:
+            return _solve(Record(task, None, report, own_terms), until, start, executor, jobs)
+        request = Request(request_hash(task), until, None, None if start is None else str(start), force)
+        with solving(out, place, task, request, resume, keeps=not own_terms) as (keeper, journal, scratch):
+            record = Record(task, keeper, report, own_terms, journal, scratch)
+            return _solve(record, until, start, executor, jobs)
+
+
+def _solve(record: Record, until: str, start: Path | None, executor: Executor | None, jobs: int) -> Design:
+    """The design, written if there is a place for it."""
+    task = record.task
+    model = _model(record)
     if task.is_placed:
-        try_out(replace(build_model(task), own_terms=own_terms), task.search.max_joints)
+        try_out(model, task.search.max_joints)
     if until in STAGES[2:]:
         load_mujoco()  # before hours of work, not after them
-    jobs = jobs or os.cpu_count() or 1
-    record = Record(task, out, progress or (lambda _: None), own_terms)
-    seen = findings(task, build_model(task))
+    seen = findings(task, model)
     if never := [each.reason for each in seen if each.certain]:
-        return record.keep(replace(record.design, reason=format_reasons(never)))
+        return record.keep(replace(record.design, reason=format_reasons(never)), last=True)
     doubts = format_reasons(each.reason for each in seen)
     if doubts:
         record.log("check", doubts)
     with processes(jobs) if executor is None else nullcontext(executor) as workers:
         if not task.is_placed:
             return _design_placed(record, until, workers, jobs)
-        return record.keep(_doubted(_design(record, until, workers, jobs, start), doubts, until))
+        return record.keep(_doubted(_design(record, until, workers, jobs, start), doubts, until), last=True)
 
 
 def _doubted(design: Design, doubts: str, until: str) -> Design:
@@ -130,13 +158,13 @@ def _design_placed(record: Record, until: str, workers: Executor | None, jobs: i
         start_up(workers, jobs)
     tasks, told = place(record.task, record, workers)
     if not tasks:
-        return record.keep(unplaceable(record, told))
+        return record.keep(unplaceable(record, told), last=True)
     best: Design | None = None
     for number, task in enumerate(tasks[: ATTEMPTS if until == STAGES[-1] else 1]):
-        model = replace(build_model(task), own_terms=record.own_terms)
-        try_out(model, task.search.max_joints)
         # The first is written as it grows; what a second leaves half done shall not replace it.
         own = record.placed(task, {**told, "chosen": number}, written=number == 0)
+        model = _model(own)
+        try_out(model, task.search.max_joints)
         seen = findings(task, model)
         if never := [each.reason for each in seen if each.certain]:
             design = replace(own.design, reason=format_reasons(never))
@@ -147,8 +175,7 @@ def _design_placed(record: Record, until: str, workers: Executor | None, jobs: i
         if best.status == "certified":
             break
     assert best is not None
-    if record.out is not None:
-        best.save(record.out)
+    record.keeper.keep(best, last=True)
     return best
 
 
@@ -162,10 +189,15 @@ def _refine_again(record: Record, start: Path) -> Design | None:
 
     Motors that share joints are looked for anew, from a motor for every joint.
     """
-    earlier, model = Design.load(start), _model(record)
-    whole, margin = warm_start(earlier, record.task, model), kept_margin(earlier)
+    model = _model(record)
+
+    def begin() -> tuple[WholeHand, Margin | None]:
+        earlier = Design.load(start)
+        return warm_start(earlier, record.task, model), kept_margin(earlier)
+
+    whole, margin = record.journal.once("start", begin)
     adopt(record, model, whole)
-    judge = Judge(model, as_floating(model, whole))
+    judge = Judge(model, as_floating(model, whole), record.scratch)
     # Replays of one hand take about as long as other processes take to start.
     design, _ = Refiner(record, model, judge, jobs=1).certify(whole, (), margin, near=True)
     record.update(stages=[{**run, "started_from": str(start)} for run in record.design.stages])
@@ -197,7 +229,7 @@ def _run(record: Record, until: str, executor: Executor | None, jobs: int) -> De
     found = run_search(record, model, search)
     if until == "synthesis":
         return _stopped(record, until)
-    judge = Judge(model, floating)
+    judge = Judge(model, floating, record.scratch)
     if until == "whole_hand":
         run_whole_hand(record, model, floating, found.candidates[0])
         design = judge.judge(record.design, [shortcoming_reason(model, short) for short in found.short])

@@ -26,7 +26,7 @@ def run_floating(record: Record, model: Model) -> Floating:
     """Stage 1."""
     weights = _weights(record, model, "floating")
     with record.stage("floating", f"object's motion with {model.contacts} floating contacts"):
-        result = solve_floating(model, weights)
+        result = record.journal.once("floating", lambda: solve_floating(model, weights))
     _add_floating_runs(record, result)
     record.set_costs("floating", result.solution, weights)
     record.set_unmet("floating", unmet_bounds(result.model, "floating", result.solution))
@@ -38,7 +38,8 @@ def run_floating(record: Record, model: Model) -> Floating:
 def run_shortened(record: Record, model: Model, whole: Floating) -> Floating:
     """Stage 1 over a share of the way to the goals, with the contacts that act over the whole of it."""
     with record.stage("floating", "object's motion over a part of the way, which fingers can surely go with it"):
-        result = FloatingStage(model).solve_as(whole, _weights(record, model, "floating"))
+        weights = _weights(record, model, "floating")
+        result = record.journal.once("floating, a part", lambda: FloatingStage(model).solve_as(whole, weights))
     _add_floating_runs(record, result)
     return result
 
@@ -61,6 +62,7 @@ def prepare_search(record: Record, model: Model, floating: Floating, executor: E
         threshold=settings.threshold,
         seed=settings.seed,
         executor=executor,
+        journal=record.journal,
         progress=lambda text: record.log("synthesis", text),
     )
 
@@ -83,8 +85,13 @@ def run_whole_hand(record: Record, model: Model, floating: Floating, candidate: 
     task, joints = record.task, "+".join(map(str, candidate.joints))
     weights = _weights(record, model, "whole_hand")
     with record.stage("whole_hand", f"object and hand of {joints} joints together"):
-        stage = WholeHandStage(model, candidate.hand.contacts, candidate.joints, task.palm.may_move)
-        result = stage.solve(floating, candidate.hand.fingers, weights)
+        hand = candidate.hand
+
+        def solve() -> WholeHand:
+            stage = WholeHandStage(model, hand.contacts, candidate.joints, task.palm.may_move)
+            return stage.solve(floating, hand.fingers, weights)
+
+        result = record.journal.once("whole hand", solve)
     record.add_runs([run_record("whole_hand", "hand", task.search.seed, "", result.solution)])
     record.set_costs("whole_hand", result.solution, weights)
     record.set_unmet("whole_hand", unmet_bounds(model, "whole_hand", result.solution))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,10 @@ from typing import Any
 from casadi_hands.errors import DesignError
 from casadi_hands.export.folder import remove_design
 from casadi_hands.export.page.page import MenuEntry, write_page
+from casadi_hands.export.place import replace_file
 from casadi_hands.export.record import record_text
 from casadi_hands.pipeline.alternatives.ranking import Alternative
+from casadi_hands.pipeline.keeper import Keeper
 
 FOLDER = "alternatives"
 RANKING = "ranking.json"
@@ -24,7 +27,7 @@ def seed_folder(directory: Path, seed: int) -> Path:
     return directory / FOLDER / f"seed{seed}"
 
 
-def write_ranking(ranked: Sequence[Alternative], directory: Path) -> None:
+def write_ranking(ranked: Sequence[Alternative], directory: Path, keeper: Keeper, last: bool) -> None:
     """Write the best design into the folder itself, the ranking, and the menus of the pages of what is kept.
 
     The folders of the seeds must have been written.
@@ -32,17 +35,21 @@ def write_ranking(ranked: Sequence[Alternative], directory: Path) -> None:
     Args:
         ranked: best first.
         directory: the exploration's.
+        keeper: of the folder itself.
+        last: whether all seeds are done.
 
     Raises:
         DesignError: the folder cannot be written.
     """
-    ranked[0].design.save(directory)
+    keeper.keep(ranked[0].design, last)
     kept = [one for one in ranked if one.kept]
     record = {"format": _FORMAT, "seeds": [_entry(one) for one in ranked]}
     try:
-        (directory / FOLDER / RANKING).write_text(record_text(record), encoding="utf-8")
+        text = record_text(record)
+        replace_file(directory / FOLDER / RANKING, lambda path: path.write_text(text, encoding="utf-8"))
         if len(kept) > 1:
-            _write_menu(kept, kept[0], directory, f"{FOLDER}/")
+            if keeper.rival is None:
+                _write_menu(kept, kept[0], directory, f"{FOLDER}/")
             for one in kept:
                 _write_menu(kept, one, seed_folder(directory, one.seed), "../")
     except OSError as error:
@@ -68,6 +75,8 @@ def remove_alternatives(directory: Path) -> None:
     for each in folder.iterdir():
         if re.fullmatch(r"seed\d+", each.name) and each.is_dir():
             remove_design(each)
+        elif re.fullmatch(r"\.seed\d+\.solve", each.name):
+            shutil.rmtree(each, ignore_errors=True)
     try:
         (folder / RANKING).unlink(missing_ok=True)
         if not any(folder.iterdir()):
@@ -99,4 +108,4 @@ def _write_menu(kept: Sequence[Alternative], shown: Alternative, directory: Path
         )
         for one in kept
     ]
-    write_page(shown.design, directory / "viewer.html", menu=menu)
+    replace_file(directory / "viewer.html", lambda path: write_page(shown.design, path, menu=menu))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from casadi_hands.errors import SolveError
+from casadi_hands.execution.journal import Journal
 from casadi_hands.execution.processes import run_all
 from casadi_hands.kinematics.morphology import FingerSeed
 from casadi_hands.stages.synthesis.score import THRESHOLD, finger_scores, singular_fingers, worst_miss
@@ -68,6 +69,7 @@ class Search:
         trials, recombinations, max_joints, threshold, seed: the task's search settings.
         executor: where trials run; None for here.
         progress: told in words what was tried and the best score so far.
+        journal: where trials are kept; by default they are not.
     """
 
     def __init__(
@@ -82,11 +84,12 @@ class Search:
         seed: int,
         executor: Executor | None,
         progress: Progress,
+        journal: Journal | None = None,
     ) -> None:
         self.target, self.weights = target, weights
         self.trials, self.recombinations, self.max_joints, self.seed = trials, recombinations, max_joints, seed
         self.threshold = THRESHOLD if threshold is None else threshold
-        self.executor, self.progress = executor, progress
+        self.executor, self.progress, self.journal = executor, progress, journal or Journal()
         self.names = target.model.contact_names
         # A contact that never acts has no finger.
         self.contacts = tuple(c for c in range(len(self.names)) if target.active[:, c].any())
@@ -133,7 +136,12 @@ class Search:
                 f"best score {best[contact]:.3f}"
             )
 
-        results = run_all(self.executor, design_finger, work, done)
+        def name(index: int) -> str:
+            _, contact, of, (*_, trial), _ = work[index]
+            return f"finger {self.names[contact]}, {of} joint(s), trial {trial + 1}"
+
+        kept = self.journal.section(f"fingers of {joints} joints")
+        results = run_all(self.executor, design_finger, work, done, kept, name)
         for c in growing:
             self.grown[c] = joints[c]
             pool = [r for args, r in zip(work, results, strict=True) if args[1] == c]
@@ -158,7 +166,8 @@ class Search:
         def done(index: int, result: Synthesised) -> None:
             self.progress(f"hand {index + 1}/{len(work)}, objective {result.solution.objective:.3f}")
 
-        results = run_all(self.executor, combine_fingers, work, done)
+        kept = self.journal.section(f"hands of {round_key} joints")
+        results = run_all(self.executor, combine_fingers, work, done, kept, lambda index: f"hand {index + 1}")
         candidates = []
         for trial, result in enumerate(results):
             scores = tuple(float(s) for s in finger_scores(self.target, result))

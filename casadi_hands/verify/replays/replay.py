@@ -21,6 +21,7 @@ from __future__ import annotations
 import multiprocessing
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -30,6 +31,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.errors import HandsError
+from casadi_hands.lifetime import follow_parent
 from casadi_hands.verify.held import held
 from casadi_hands.verify.reading.folder import Folder, read_folder
 from casadi_hands.verify.replays.mounted import turned_far
@@ -132,15 +134,22 @@ def replay_each(
         engine: one of ``ENGINES``.
 
     Raises:
-        DesignError, HandsError: as `replay`.
+        DesignError, HandsError: as `replay`; and processes died again and again.
     """
     if jobs == 1:
         return _replay_all(directory, engine, perturbations)
     shares = [perturbations[k::jobs] for k in range(min(jobs, len(perturbations)))]
     # Forking a process that runs threads (a progress display, a solver) can hang it.
-    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
-        played = list(pool.map(partial(_replay_all, directory, engine), shares))
-    return [played[k % jobs][k // jobs] for k in range(len(perturbations))]
+    context = multiprocessing.get_context("spawn")
+    for _ in range(ATTEMPTS):
+        try:
+            with ProcessPoolExecutor(jobs, mp_context=context, initializer=follow_parent) as pool:
+                played = list(pool.map(partial(_replay_all, directory, engine), shares))
+        except BrokenProcessPool as error:
+            lost = error
+        else:
+            return [played[k % jobs][k // jobs] for k in range(len(perturbations))]
+    raise HandsError(f"{directory}: processes that replay this died each of {ATTEMPTS} times") from lost
 
 
 def _replay_all(directory: str | Path, engine: str, perturbations: Sequence[Perturbation]) -> list[Replay]:
@@ -179,6 +188,9 @@ def _drake(folder: Folder, perturbation: Perturbation) -> World:
 
     return DrakeSimulation(folder, perturbation)
 
+
+ATTEMPTS = 3
+"""Times that processes may die with replays before these are given up."""
 
 ENGINES: dict[str, Callable[[Folder, Perturbation], World]] = {"mujoco": Simulation, "drake": _drake}
 """Physics engines by name."""

@@ -1,0 +1,106 @@
+"""Where the designs of a solve go, and what stands there already: a result makes way for a better one only."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from casadi_hands.errors import DesignError
+from casadi_hands.export.design import Design
+from casadi_hands.export.place import LAST, shown
+from casadi_hands.export.record import STATUSES
+from casadi_hands.pipeline.rank import rank_of
+from casadi_hands.task import Task
+
+
+class Keeper:
+    """Writes designs of one task into a folder.
+
+    Args:
+        out: the folder; None to write nothing.
+        rival: the result that stands there, if only a better one may take its place.
+        replaces: whether the last design takes its place in any case.
+        before: is called before a design is written.
+    """
+
+    def __init__(
+        self,
+        out: Path | None,
+        rival: Design | None = None,
+        replaces: bool = False,
+        before: Callable[[], None] = lambda: None,
+    ) -> None:
+        self.out, self.rival, self.replaces, self._before = out, rival, replaces, before
+        self.outdone = False
+
+    def keep(self, design: Design, last: bool = False) -> None:
+        """Write a design, unless what stands there is better.
+
+        Args:
+            design: of the solve.
+            last: whether no other follows. Where it is not written, the keeper is ``outdone``.
+
+        Raises:
+            DesignError: it cannot be written.
+        """
+        if self.out is None:
+            return
+        if self.rival is not None and not (last and self.replaces) and _standing(design) > _standing(self.rival):
+            self.outdone = last
+            return
+        self._before()
+        design.save(self.out)
+        self.rival = None
+
+
+def rival_in(out: Path, task: Task, force: bool = False) -> Design | None:
+    """The result in a folder that only a better one may replace.
+
+    Args:
+        out: the folder; need not exist.
+        task: that is to be solved into it.
+        force: whether whatever stands there may be replaced in the end. Until then it stands.
+
+    Returns:
+        A judged design. None where there is no result, one that was not judged, or a failed one of another task.
+
+    Raises:
+        DesignError: a new result would take the place of one that is certified, that is not of this task and has not
+            failed, or that cannot be read; unless that is forced.
+    """
+    if not (out / LAST).is_file():
+        return None
+    try:
+        found = Design.load(out)
+    except DesignError as error:
+        if force:
+            return None
+        raise DesignError(f"{shown(out)}: holds a result that cannot be read ({error}); {_REMEDY}") from error
+    same = _asked(found.task) == _asked(task)
+    if not force and (found.status == "certified" or (not same and found.status != "failed")):
+        which = "this task" if same else f"another task ({found.task.name})"
+        raise DesignError(f"{shown(out)}: holds a {found.status} result of {which} already; {_REMEDY}")
+    judged = bool(found.certificate) and (same or found.status != "failed")
+    return found if judged else None
+
+
+_REMEDY = "--force replaces it when there is another, --out names another folder"
+
+
+def _asked(task: Task) -> Task:
+    """What a task asks for, however it is looked for."""
+    default = Task.model_fields
+    how = {name: default[name].get_default(call_default_factory=True) for name in _HOW}
+    fingers = {
+        name: each if each.placed is None else each.model_copy(update={"touches": each.placed, "placed": None})
+        for name, each in task.fingers.items()
+    }
+    return task.model_copy(update={**how, "fingers": fingers})
+
+
+_HOW = ("search", "weights")
+
+
+def _standing(design: Design) -> tuple[float, ...]:
+    """How good a design is, best first."""
+    return STATUSES.index(design.status), not design.certificate, *rank_of(design)
