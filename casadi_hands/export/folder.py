@@ -105,6 +105,25 @@ def read_design(directory: Path) -> dict[str, Any]:
     Raises:
         DesignError: there is no such folder, it is incomplete, or of another format.
     """
+    while True:
+        before = _which(directory)
+        try:
+            found = _read(directory)
+        except DesignError:
+            if _which(directory) == before:
+                raise
+        else:
+            if _which(directory) == before:
+                return found
+        # Another design took its place meanwhile.
+
+
+def _which(directory: Path) -> int | None:
+    """The folder that has this name now."""
+    return directory.stat().st_ino if directory.exists() else None
+
+
+def _read(directory: Path) -> dict[str, Any]:
     record = read_record(directory)
     try:
         task = load_task(directory / "task.yaml", within=True)
