@@ -15,6 +15,7 @@ from typing import Any
 
 from casadi_hands.errors import DesignError
 from casadi_hands.export.design import Design
+from casadi_hands.export.place import beside, owned
 from casadi_hands.task import Task, task_to_yaml
 
 ENDED = "ended.json"
@@ -49,6 +50,7 @@ def solve_apart(task: Task, folder: Path, until: str, jobs: int | None, limit: f
         how = _how(process.exitcode, part / LOG, limit)
     finally:
         _end_group(process)
+        _clear(part)
     # Saving replaces a folder's own files; these are not among them, and would be old.
     if how:
         ended = {"how": how, "minutes": limit}
@@ -110,6 +112,13 @@ def _how(code: int | None, log: Path, limit: float | None) -> str:
         return f"the solver crashed ({signal.Signals(-code).name})"
     lines = log.read_text(encoding="utf-8", errors="replace").split("\n") if log.is_file() else []
     return f"the solver crashed: {next((line for line in reversed(lines) if line.strip()), f'exit status {code}')}"
+
+
+def _clear(folder: Path) -> None:
+    """Bring back into a folder what an ended solve had beside it, and remove that: solves are not gone on with here."""
+    with suppress(DesignError), owned(folder):
+        pass
+    shutil.rmtree(beside(folder), ignore_errors=True)
 
 
 def _end_group(process: Any) -> None:

@@ -38,15 +38,16 @@ class Keeper:
 
         Args:
             design: of the solve.
-            last: whether no other follows. Where it is not written, the keeper is ``outdone``.
+            last: whether no other follows. Where it is not written, the keeper is ``outdone`` until one is.
 
         Raises:
             DesignError: it cannot be written.
         """
         if self.out is None:
             return
-        if self.rival is not None and not (last and self.replaces) and _standing(design) > _standing(self.rival):
-            self.outdone = last
+        forced = last and self.replaces
+        self.outdone = self.rival is not None and not forced and _standing(design) > _standing(self.rival)
+        if self.outdone:
             return
         self._before()
         design.save(self.out)

@@ -47,7 +47,15 @@ def test_values_come_back_as_they_were() -> None:
 
 def test_arrays_lie_in_memory_as_they_did(rng: np.random.Generator) -> None:
     cube = rng.normal(size=(2, 3, 4))
-    for array in (cube, cube.T, cube.transpose(1, 0, 2), cube.transpose(2, 0, 1), cube[0, 0, 0], np.zeros((0, 3)), cube[:1]):
+    for array in (
+        cube,
+        cube.T,
+        cube.transpose(1, 0, 2),
+        cube.transpose(2, 0, 1),
+        cube[0, 0, 0],
+        np.zeros((0, 3)),
+        cube[:1],
+    ):
         found = unpack(pack(array))
         assert found.tobytes("A") == array.tobytes("A")
         assert (found.flags.c_contiguous, found.flags.f_contiguous) == (

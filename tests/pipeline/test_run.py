@@ -83,7 +83,7 @@ def test_a_certified_refinement_of_the_earlier_hand_is_the_result(
 
 def test_the_folder_that_is_written_may_be_the_start(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     refined_as(monkeypatch, "certified", 0)
-    solve(parse_task(edited("mass: 0.1 -> mass: 0.15")), jobs=1, out=folder, start=folder)
+    solve(parse_task(edited("mass: 0.1 -> mass: 0.15")), jobs=1, out=folder, start=folder, force=True)
     motion = Design.load(folder).motion
     assert motion is not None
     np.testing.assert_allclose(motion.contact_force, 1.5 * pressing(4.1, 0.8).contact_force, atol=1e-9)

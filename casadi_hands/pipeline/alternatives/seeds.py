@@ -102,12 +102,13 @@ def _explored(
     began = time.perf_counter()
     designs: dict[int, Design] = {}
     errors: list[SolveError] = []
+    journal.once("begun", lambda: list(seeds))  # from now on there is what to go on with
     for seed in seeds:
         folder = None if out is None else seed_folder(out, seed)
         told = _within(report, seed, time.perf_counter() - began)
         unit = journal.section(f"seed {seed}")
         if folder is not None and unit.has(0):
-            designs[seed] = Design.load(folder)
+            designs[seed] = replace(unit.get(0), task=_with_seed(task, seed))
             continue
         goes_on = folder is not None and is_unfinished(folder)
         try:
@@ -117,7 +118,7 @@ def _explored(
             if len(errors) == len(seeds):
                 raise  # not the seeds' fault
             designs[seed] = _broken_off(task, seed, folder, error)
-        unit.put(0, seed)
+        unit.put(0, replace(designs[seed], task=None))  # type: ignore[arg-type]
         if out is not None and len(designs) < len(seeds):
             write_ranking(rank(designs), out, keeper, last=False)
     ranked = rank(designs)
@@ -141,10 +142,13 @@ def _within(report: Callable[[Progress], None], seed: int, before: float) -> Cal
     return log
 
 
+def _with_seed(task: Task, seed: int) -> Task:
+    return task.model_copy(update={"search": task.search.model_copy(update={"seed": seed})})
+
+
 def _broken_off(task: Task, seed: int, folder: Path | None, error: Exception) -> Design:
     """A failed design with what the solve had written, and why it ended."""
-    search = task.search.model_copy(update={"seed": seed})
-    design = Design(task=task.model_copy(update={"search": search}), status="failed")
+    design = Design(task=_with_seed(task, seed), status="failed")
     if folder is not None:
         # It may have ended before anything was written.
         with suppress(DesignError):

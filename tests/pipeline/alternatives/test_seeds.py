@@ -65,7 +65,7 @@ def test_the_best_is_in_the_folder_and_the_distinct_ones_beside_it(solves, tmp_p
     workers = ThreadPoolExecutor(1)
     found = explore(example_task(), seeds=range(4, 7), jobs=1, until="whole_hand", out=tmp_path, executor=workers)
     assert [(one.seed, one.kept, one.like) for one in found] == [(5, True, None), (6, False, 5), (4, True, None)]
-    settings = {"jobs": 1, "until": "whole_hand", "executor": workers, "terms": ()}
+    settings = {"jobs": 1, "until": "whole_hand", "executor": workers, "terms": (), "force": True, "resume": False}
     assert calls[1] == {"seed": 5, "out": tmp_path / "alternatives/seed5", **settings}
     assert Design.load(tmp_path).hand == best.hand
     assert {path.name for path in (tmp_path / "alternatives").iterdir()} == {"seed4", "seed5", "ranking.json"}
@@ -153,7 +153,7 @@ def test_nothing_of_an_earlier_exploration_is_left_and_nothing_else_is_touched(s
     for mine in ("notes.txt", "alternatives/notes.txt", "alternatives/seed2/notes.txt"):
         (tmp_path / mine).write_text("mine")
     (tmp_path / "alternatives/seeds").mkdir()
-    explore(example_task(), seeds=[0], out=tmp_path)
+    explore(example_task(), seeds=[0], out=tmp_path, force=True)
     assert [one["seed"] for one in ranking(tmp_path)] == [0]
     left = {str(path.relative_to(tmp_path / "alternatives")) for path in (tmp_path / "alternatives").rglob("*")}
     assert {name for name in left if not name.startswith("seed0")} == {
