@@ -2,8 +2,9 @@
 
 Chains: a solve is killed at a random moment, gone on with by ``--resume``, killed again, until one ends by itself; its
 design must be that of a solve that nobody killed. After each kill the folder must hold a complete result or not exist,
-and no process and no temporary folder may be left. Writes: a process that does nothing but write two designs in turn
-into one folder is killed; the folder must hold the one or the other, whole.
+and no process and no temporary folder may be left. Workers: those of a solve are killed, and it must end with that
+design all the same. Writes: a process that does nothing but write two designs in turn into one folder is killed; the
+folder must hold the one or the other, whole.
 """
 
 from __future__ import annotations
@@ -40,6 +41,7 @@ def main() -> None:
     options = options_of(__doc__ or "")
     options.add_argument("task", type=Path, help="a task file, best one that solves in seconds")
     options.add_argument("--kills", type=int, default=100, help="of solves")
+    options.add_argument("--workers", type=int, default=10, help="solves whose workers are killed")
     options.add_argument("--writes", type=int, default=300, help="kills during writing")
     options.add_argument("--longest", type=float, default=8.0, help="s after which a solve is killed, at most")
     options.add_argument("--seed", type=int, default=0)
@@ -57,6 +59,9 @@ def main() -> None:
                     break
                 chained(given.task, root / f"chain{chain}", reference, given, rng, found)
                 print(dict(found), file=sys.stderr, flush=True)
+        for turn in range(given.workers):
+            without_workers(given.task, root / f"workers{turn}", reference, given, rng, found)
+            print(dict(found), file=sys.stderr, flush=True)
         if given.writes:
             killed_writes(reference, root / "writes", given.writes, rng, found)
     for what, times in found.items():
@@ -97,16 +102,42 @@ def chained(task: Path, room: Path, reference: Path, given: Any, rng: random.Ran
         found[f"BAD: exit status {process.returncode}: {err[-300:]}"] += 1
     elif beside(folder).exists():
         found["BAD: left beside a finished result"] += 1
-    different = [name for name in FILES if content(folder / name) != content(reference / name)]
-    label = "went on to the design of an uninterrupted solve" if kills else "not killed, with the same design"
-    found[f"BAD: other {', '.join(different)}" if different else label] += 1
+    compare(folder, reference, "went on to the design of an uninterrupted solve" if kills else "not killed", found)
     shutil.rmtree(room)
+
+
+def without_workers(
+    task: Path, room: Path, reference: Path, given: Any, rng: random.Random, found: Counter[str]
+) -> None:
+    """Kill a worker of a solve now and then, no trial's more than twice."""
+    process = subprocess.Popen(
+        [*COMMAND, str(task), "--out", str(room), "--jobs", "2"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    for _ in range(2):
+        time.sleep(rng.uniform(0.2, 0.5) * given.longest)
+        if workers := [pid for pid, words in commands(process.pid) if "spawn_main" in words]:
+            os.kill(rng.choice(workers), signal.SIGKILL)
+            found["workers killed"] += 1
+    _, err = process.communicate()
+    if process.returncode not in (0, 1):
+        found[f"BAD: exit status {process.returncode}: {err[-300:]}"] += 1
+    compare(room, reference, "workers killed, and the same design", found)
+
+
+def compare(folder: Path, reference: Path, good: str, found: Counter[str]) -> None:
+    """Count whether a folder holds the design that another does."""
+    different = [name for name in FILES if content(folder / name) != content(reference / name)]
+    found[f"BAD: other {', '.join(different)}" if different else good] += 1
 
 
 def judge(process: subprocess.Popen[str], folder: Path, scratch: Path, way: str, found: Counter[str]) -> None:
     """See what a kill has left."""
     began = time.monotonic()
-    while left := list(session(process.pid)):
+    while left := [pid for pid, _ in commands(process.pid)]:
         if time.monotonic() - began > GRACE:
             found[f"BAD: {len(left)} processes are left {GRACE:g} s after {way}"] += 1
             for each in left:
@@ -124,13 +155,13 @@ def judge(process: subprocess.Popen[str], folder: Path, scratch: Path, way: str,
         found[f"BAD: temporary folders are left after {way}: {sorted(p.name for p in scratch.iterdir())}"] += 1
 
 
-def session(leader: int) -> Iterator[int]:
-    """Processes of a session that have not ended."""
-    listed = subprocess.run(["ps", "-eo", "pid=,sess=,stat="], capture_output=True, text=True, check=True).stdout
+def commands(session: int) -> Iterator[tuple[int, str]]:
+    """Processes of a session that have not ended, and their commands."""
+    listed = subprocess.run(["ps", "-eo", "pid=,sess=,stat=,args="], capture_output=True, text=True, check=True).stdout
     for line in listed.splitlines():
-        pid, of, state = line.split()
-        if int(of) == leader and not state.startswith("Z"):
-            yield int(pid)
+        pid, of, state, words = line.split(maxsplit=3)
+        if int(of) == session and not state.startswith("Z"):
+            yield int(pid), words
 
 
 def complete(folder: Path) -> str:
