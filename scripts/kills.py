@@ -19,12 +19,14 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from shared import options_of
 
+import casadi_hands.pipeline.alternatives  # noqa: F401 (so that solves need not load it)
+from casadi_hands.cli import main as main_of_package
 from casadi_hands.errors import HandsError
 from casadi_hands.export.design import Design
 from casadi_hands.export.place import FILES, beside
@@ -32,7 +34,6 @@ from casadi_hands.verify import audit_files
 
 AGAIN = 0.7  # share of those that went on that are killed, too
 GRACE = 2.0  # s that processes may take to end
-COMMAND = [sys.executable, "-c", "from casadi_hands.cli import main; main()", "solve"]
 WAYS = {"SIGKILL": signal.SIGKILL, "SIGTERM": signal.SIGTERM}
 
 
@@ -51,7 +52,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as work:
         root = Path(work)
         reference = root / "reference"
-        subprocess.run([*COMMAND, given.task, "--out", reference, "--jobs", "1"], check=False, capture_output=True)
+        Solve([given.task, "--out", reference, "--jobs", 1], root).wait(None)
         found = Counter[str]()
         if given.kills:
             for chain in range(given.kills):
@@ -73,33 +74,23 @@ def chained(task: Path, room: Path, reference: Path, given: Any, rng: random.Ran
     """Kill a solve and what goes on from it, until one ends."""
     folder, scratch = room / "out", room / "tmp"
     scratch.mkdir(parents=True)
-    environment = {**os.environ, "TMPDIR": str(scratch)}
     kills = 0
     while True:
         goes_on = (beside(folder) / "request.json").exists() and any(beside(folder).glob("units/*.npz"))
-        what = ["--resume", str(folder)] if goes_on else [str(task), "--out", str(folder)]
-        process = subprocess.Popen(
-            [*COMMAND, *what, "--jobs", str(given.jobs)],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-            env=environment,
-            start_new_session=True,
-        )
+        what = ["--resume", folder] if goes_on else [task, "--out", folder]
+        solve = Solve([*what, "--jobs", given.jobs], scratch)
         killed = found["kills"] < given.kills and (not kills or rng.random() < AGAIN)
         patience = rng.uniform(0, given.longest) if killed else None
-        try:
-            _, err = process.communicate(timeout=patience)
+        if solve.wait(patience) is not None:
             break
-        except subprocess.TimeoutExpired:
-            way = rng.choice(list(WAYS))
-            process.send_signal(WAYS[way])
-            kills += 1
-            found["kills"] += 1
-            found[f"by {way}"] += 1
-            judge(process, folder, scratch, way, found)
-    if process.returncode not in (0, 1):
-        found[f"BAD: exit status {process.returncode}: {err[-300:]}"] += 1
+        way = rng.choice(list(WAYS))
+        os.kill(solve.pid, WAYS[way])
+        kills += 1
+        found["kills"] += 1
+        found[f"by {way}"] += 1
+        judge(solve, folder, scratch, way, found)
+    if solve.status not in (0, 1):
+        found[f"BAD: exit status {solve.status}: {solve.words()}"] += 1
     elif beside(folder).exists():
         found["BAD: left beside a finished result"] += 1
     compare(folder, reference, "went on to the design of an uninterrupted solve" if kills else "not killed", found)
@@ -110,22 +101,17 @@ def without_workers(
     task: Path, room: Path, reference: Path, given: Any, rng: random.Random, found: Counter[str]
 ) -> None:
     """Kill a worker of a solve now and then, no trial's more than twice."""
-    process = subprocess.Popen(
-        [*COMMAND, str(task), "--out", str(room), "--jobs", "2"],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
+    room.mkdir()
+    folder = room / "out"
+    solve = Solve([task, "--out", folder, "--jobs", 2], room)
     for _ in range(2):
-        time.sleep(rng.uniform(0.2, 0.5) * given.longest)
-        if workers := [pid for pid, words in commands(process.pid) if "spawn_main" in words]:
+        solve.wait(rng.uniform(0.2, 0.5) * given.longest)
+        if workers := [pid for pid, words in commands(solve.pid) if "spawn_main" in words]:
             os.kill(rng.choice(workers), signal.SIGKILL)
             found["workers killed"] += 1
-    _, err = process.communicate()
-    if process.returncode not in (0, 1):
-        found[f"BAD: exit status {process.returncode}: {err[-300:]}"] += 1
-    compare(room, reference, "workers killed, and the same design", found)
+    if solve.wait(None) not in (0, 1):
+        found[f"BAD: exit status {solve.status}: {solve.words()}"] += 1
+    compare(folder, reference, "workers killed, and the same design", found)
 
 
 def compare(folder: Path, reference: Path, good: str, found: Counter[str]) -> None:
@@ -134,19 +120,62 @@ def compare(folder: Path, reference: Path, good: str, found: Counter[str]) -> No
     found[f"BAD: other {', '.join(different)}" if different else good] += 1
 
 
-def judge(process: subprocess.Popen[str], folder: Path, scratch: Path, way: str, found: Counter[str]) -> None:
+class Solve:
+    """The command ``solve`` in a process and a session of its own, loaded already.
+
+    Args:
+        arguments: of the command.
+        scratch: folder for temporary files; what the command says goes beside it.
+    """
+
+    def __init__(self, arguments: Sequence[Any], scratch: Path) -> None:
+        self.status: int | None = None
+        self._log = scratch.with_suffix(".log")
+        self.pid = os.fork()
+        if self.pid:
+            return
+        os.setsid()
+        log = os.open(self._log, os.O_CREAT | os.O_TRUNC | os.O_WRONLY)
+        for stream in (1, 2):
+            os.dup2(log, stream)
+        os.environ["TMPDIR"] = tempfile.tempdir = str(scratch)
+        sys.argv = ["casadi-hands", "solve", *map(str, arguments)]
+        try:
+            main_of_package()
+        except SystemExit as ended:
+            os._exit(ended.code if isinstance(ended.code, int) else 1)
+        os._exit(0)
+
+    def wait(self, patience: float | None) -> int | None:
+        """The exit status, or minus the signal, of a solve that has ended; None of one that goes on after so many s."""
+        last = time.monotonic() + (patience or 0.0)
+        while self.status is None:
+            pid, status = os.waitpid(self.pid, 0 if patience is None else os.WNOHANG)
+            if pid:
+                self.status = os.waitstatus_to_exitcode(status)
+            elif time.monotonic() > last:
+                break
+            else:
+                time.sleep(0.01)
+        return self.status
+
+    def words(self) -> str:
+        """The last of what it said."""
+        return self._log.read_text(encoding="utf-8", errors="replace")[-300:]
+
+
+def judge(solve: Solve, folder: Path, scratch: Path, way: str, found: Counter[str]) -> None:
     """See what a kill has left."""
     began = time.monotonic()
-    while left := [pid for pid, _ in commands(process.pid)]:
+    while left := [pid for pid, _ in commands(solve.pid)]:
         if time.monotonic() - began > GRACE:
             found[f"BAD: {len(left)} processes are left {GRACE:g} s after {way}"] += 1
             for each in left:
                 os.kill(each, signal.SIGKILL)
             break
-        process.poll()
-        time.sleep(0.02)
+        solve.wait(0.02)
     found["slowest end, ms"] = max(found["slowest end, ms"], round(1e3 * (time.monotonic() - began)))
-    process.communicate()
+    solve.wait(None)
     if not folder.exists():
         found["left no folder"] += 1
     else:

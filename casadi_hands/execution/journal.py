@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -91,14 +92,15 @@ class Section:
         """
         if (path := self._path(index)) is None:
             return result
-        data = pack((self._name, result))
+        data, part = pack((self._name, result)), path.with_suffix(".part")
         try:
             path.parent.mkdir(exist_ok=True)
-            part = path.with_suffix(".part")
             part.write_bytes(data)
             os.replace(part, path)
         except OSError as error:
-            raise SolveError(f"{path.parent}: cannot write what is finished here: {error}") from error
+            with suppress(OSError):
+                part.unlink()
+            raise SolveError(f"{path.parent}: cannot write what is finished here: {error.strerror or error}") from error
         kept: tuple[str, Result] = unpack(data)
         return kept[1]
 

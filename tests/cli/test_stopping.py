@@ -96,6 +96,30 @@ def test_all_its_processes_end_with_it_and_nothing_temporary_stays(
     assert {each.name for each in tmp_path.iterdir()} == {"ball.yaml", "out", "tmp"}
 
 
+BUSY = """
+import sys
+import casadi_hands.pipeline
+from casadi_hands.cli import main
+
+def solve(task, **settings):
+    print("solving", flush=True)
+    sum(range(10**12))  # lets no handler of Python's run, as CasADi does while it builds a function
+
+casadi_hands.pipeline.solve = solve
+sys.argv = ["casadi-hands", "solve", *sys.argv[1:]]
+main()
+"""
+
+
+def test_one_that_cannot_heed_a_signal_is_ended_all_the_same(task_file: Path, tmp_path: Path) -> None:
+    command = [sys.executable, "-c", BUSY, str(task_file), "--out", str(tmp_path / "out")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout
+        assert process.stdout.readline() == "solving\n"
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(timeout=10) == -signal.SIGKILL
+
+
 def test_a_full_disk_is_one_message_and_leaves_no_empty_files(task_file: Path, tmp_path: Path) -> None:
     def small_files() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))  # the page is larger
