@@ -49,22 +49,23 @@ def main() -> None:
     options.add_argument("--jobs", type=int, default=2)
     given = options.parse_args()
     rng = random.Random(given.seed)
-    with tempfile.TemporaryDirectory() as work:
-        root = Path(work)
-        reference = root / "reference"
-        Solve([given.task, "--out", reference, "--jobs", 1], root).wait(None)
-        found = Counter[str]()
-        if given.kills:
-            for chain in range(given.kills):
-                if found["kills"] >= given.kills:
-                    break
-                chained(given.task, root / f"chain{chain}", reference, given, rng, found)
-                print(dict(found), file=sys.stderr, flush=True)
-        for turn in range(given.workers):
-            without_workers(given.task, root / f"workers{turn}", reference, given, rng, found)
+    # No TemporaryDirectory: solves are forked from here, and remove those of their process as they leave.
+    root = Path(tempfile.mkdtemp())
+    reference = root / "reference"
+    Solve([given.task, "--out", reference, "--jobs", 1], root).wait(None)
+    found = Counter[str]()
+    if given.kills:
+        for chain in range(given.kills):
+            if found["kills"] >= given.kills:
+                break
+            chained(given.task, root / f"chain{chain}", reference, given, rng, found)
             print(dict(found), file=sys.stderr, flush=True)
-        if given.writes:
-            killed_writes(reference, root / "writes", given.writes, rng, found)
+    for turn in range(given.workers):
+        without_workers(given.task, root / f"workers{turn}", reference, given, rng, found)
+        print(dict(found), file=sys.stderr, flush=True)
+    if given.writes:
+        killed_writes(reference, root / "writes", given.writes, rng, found)
+    shutil.rmtree(root)
     for what, times in found.items():
         print(f"{times:5d}  {what}")
     sys.exit(any(what.startswith("BAD") for what in found))
