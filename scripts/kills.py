@@ -21,6 +21,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from shared import options_of
@@ -44,6 +45,7 @@ def main() -> None:
     options.add_argument("--kills", type=int, default=100, help="of solves")
     options.add_argument("--workers", type=int, default=10, help="solves whose workers are killed")
     options.add_argument("--writes", type=int, default=300, help="kills during writing")
+    options.add_argument("--until", default="refine", help="the last stage of solves")
     options.add_argument("--longest", type=float, default=8.0, help="s after which a solve is killed, at most")
     options.add_argument("--seed", type=int, default=0)
     options.add_argument("--jobs", type=int, default=2)
@@ -51,8 +53,9 @@ def main() -> None:
     rng = random.Random(given.seed)
     # No TemporaryDirectory: solves are forked from here, and remove those of their process as they leave.
     root = Path(tempfile.mkdtemp())
-    reference = root / "reference"
-    Solve([given.task, "--out", reference, "--jobs", 1], root).wait(None)
+    reference, scratch = root / "reference", root / "tmp"
+    scratch.mkdir()
+    Solve([given.task, "--out", reference, "--jobs", 1, "--until", given.until], scratch).wait(None)
     found = Counter[str]()
     if given.kills:
         for chain in range(given.kills):
@@ -78,7 +81,7 @@ def chained(task: Path, room: Path, reference: Path, given: Any, rng: random.Ran
     kills = 0
     while True:
         goes_on = (beside(folder) / "request.json").exists() and any(beside(folder).glob("units/*.npz"))
-        what = ["--resume", folder] if goes_on else [task, "--out", folder]
+        what = ["--resume", folder] if goes_on else [task, "--out", folder, "--until", given.until]
         solve = Solve([*what, "--jobs", given.jobs], scratch)
         killed = found["kills"] < given.kills and (not kills or rng.random() < AGAIN)
         patience = rng.uniform(0, given.longest) if killed else None
@@ -104,7 +107,7 @@ def without_workers(
     """Kill a worker of a solve now and then, no trial's more than twice."""
     room.mkdir()
     folder = room / "out"
-    solve = Solve([task, "--out", folder, "--jobs", 2], room)
+    solve = Solve([task, "--out", folder, "--jobs", 2, "--until", given.until], room)
     for _ in range(2):
         solve.wait(rng.uniform(0.2, 0.5) * given.longest)
         if workers := [pid for pid, words in commands(solve.pid) if "spawn_main" in words]:
@@ -136,6 +139,8 @@ class Solve:
         if self.pid:
             return
         os.setsid()
+        # As that of the program: its workers shall not load this script.
+        sys.modules["__main__"] = ModuleType("__main__")
         log = os.open(self._log, os.O_CREAT | os.O_TRUNC | os.O_WRONLY)
         for stream in (1, 2):
             os.dup2(log, stream)
