@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -11,11 +13,13 @@ import mujoco
 import numpy as np
 import pytest
 
+from casadi_hands.errors import HandsError
 from casadi_hands.verify import Perturbation, replay, run_replays
 from casadi_hands.verify.reading.folder import Folder, read_folder
+from casadi_hands.verify.replays import replay as replay_module
 from casadi_hands.verify.replays import series
 from casadi_hands.verify.replays.perturb import draw_perturbation, suite
-from casadi_hands.verify.replays.replay import Replay
+from casadi_hands.verify.replays.replay import ATTEMPTS, Replay, replay_each
 from casadi_hands.verify.replays.simulation import Plan, Simulation
 from tests.verify.fixture import SPHERE, carried, plain, read_task
 
@@ -220,6 +224,34 @@ def test_replays_of_the_suite_do_not_depend_on_the_processes(folder: Folder, mon
     assert tuple(alone.perturbed) == few
     assert [asdict(each) for each in alone.perturbed.values()] == [asdict(each) for each in together.perturbed.values()]
     assert all(each.perturbation == suite(folder, 3, 1)[name] for name, each in together.perturbed.items())
+
+
+@pytest.mark.parametrize("deaths", [ATTEMPTS - 1, ATTEMPTS])
+def test_replays_whose_processes_die_are_played_again(
+    deaths: int, folder: Folder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun: list[int] = []
+
+    class Dying(ThreadPoolExecutor):
+        """Threads in place of processes, that die the first times."""
+
+        def __init__(self, jobs: int, **_: Any) -> None:
+            super().__init__(1)
+            begun.append(jobs)
+
+        def map(self, *arguments: Any, **named: Any) -> Any:
+            if len(begun) <= deaths:
+                raise BrokenProcessPool("a process died")
+            return super().map(*arguments, **named)
+
+    monkeypatch.setattr(replay_module, "ProcessPoolExecutor", Dying)
+    changes = [Perturbation(), Perturbation(mass=1.2)]
+    if deaths == ATTEMPTS:
+        with pytest.raises(HandsError, match="processes that replay this died each of 3 times"):
+            replay_each(folder.path, changes, jobs=2)
+    else:
+        assert [each.perturbation for each in replay_each(folder.path, changes, jobs=2)] == changes
+    assert len(begun) == ATTEMPTS
 
 
 def test_none_at_once_is_none_at_all(folder: Folder) -> None:
