@@ -30,7 +30,8 @@ import casadi_hands.pipeline.alternatives  # noqa: F401 (so that solves need not
 from casadi_hands.cli import main as main_of_package
 from casadi_hands.errors import HandsError
 from casadi_hands.export.design import Design
-from casadi_hands.export.place import FILES, beside
+from casadi_hands.export.moving import FILES
+from casadi_hands.export.place import beside
 from casadi_hands.verify import audit_files
 
 AGAIN = 0.7  # share of those that went on that are killed, too

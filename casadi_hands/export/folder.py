@@ -11,8 +11,9 @@ from casadi_hands.export.checked import read_record
 from casadi_hands.export.commands import commanded
 from casadi_hands.export.meshes import FOLDER, mesh_files
 from casadi_hands.export.mjcf import scene_mjcf
+from casadi_hands.export.moving import remove_files
 from casadi_hands.export.page.page import write_page
-from casadi_hands.export.place import remove_files, replace_folder, shown
+from casadi_hands.export.place import replace_folder, shown
 from casadi_hands.export.record import STATUSES, design_record, hand_from_record, record_text
 from casadi_hands.export.table import motion_table
 from casadi_hands.export.urdf import hand_urdf, object_urdf

@@ -7,42 +7,21 @@ beside it (a mount point, a parent that is read-only), it stands within as ``.so
 
 from __future__ import annotations
 
-import ctypes
 import errno
 import fcntl
 import hashlib
 import os
 import shutil
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
 
 from casadi_hands.errors import DesignError
-from casadi_hands.export.meshes import FOLDER
+from casadi_hands.export.moving import clear_away, exchange, move_files, to_disk
 
-LAST = "result.json"
-"""The file that makes a folder complete."""
-
-FILES = (
-    "task.yaml",
-    "hand.urdf",
-    "object.urdf",
-    "scene.xml",
-    "motion.npz",
-    "motion.csv",
-    "placement.json",
-    LAST,
-    "viewer.html",
-)
-"""A design's files; whatever else is in its folder stays there."""
-
-_MESHES = "object*.obj"
 _LOCK, _NEXT = "lock", "next-"
 _LONGEST = 200  # bytes of a folder's name that are in that of the one beside it
-_AT_FDCWD = -100
-_EXCHANGE = 2  # RENAME_EXCHANGE of Linux, RENAME_SWAP of macOS
 _NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP}
 _owned: dict[Path, Path] = {}
 _numbers = count()
@@ -159,7 +138,7 @@ def _clear(place: Path, directory: Path) -> None:
     """Clear away what a process that was killed was writing."""
     for each in place.iterdir():
         if each.name.startswith(_NEXT):
-            _remove(each, directory)
+            clear_away(each, directory)
 
 
 def _release(place: Path) -> None:
@@ -173,7 +152,7 @@ def _release(place: Path) -> None:
 def replace_folder(directory: Path, write: Callable[[Path], object]) -> None:
     """Write a design's files so that whoever reads them finds all of the old ones or all of the new ones.
 
-    Where the file system cannot exchange folders, there is a moment without ``LAST``: with nothing complete.
+    Where the file system cannot exchange folders, there is a moment without ``result.json``: with nothing complete.
 
     Args:
         directory: made if it does not exist.
@@ -191,7 +170,7 @@ def replace_folder(directory: Path, write: Callable[[Path], object]) -> None:
             write(made)
             for each in made.rglob("*"):
                 if each.is_file():
-                    _to_disk(each)
+                    to_disk(each)
             if not directory.exists():
                 os.rename(made, directory)
                 return
@@ -199,108 +178,11 @@ def replace_folder(directory: Path, write: Callable[[Path], object]) -> None:
             try:
                 if place.parent == directory:
                     raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))
-                _exchange(made, directory)
+                exchange(made, directory)
             except OSError:
-                _move_files(made, directory)
+                move_files(made, directory)
         finally:
-            _remove(made, directory)
-
-
-def replace_file(path: Path, write: Callable[[Path], object]) -> None:
-    """Write one file so that whoever reads it finds the old one or the new one, whole.
-
-    Args:
-        path: the file.
-        write: writes the new one to the path that it is given.
-
-    Raises:
-        OSError: it cannot be written; the old one stays.
-    """
-    made = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        write(made)
-        _to_disk(made)
-        os.replace(made, path)
-    finally:
-        made.unlink(missing_ok=True)
-
-
-def remove_files(directory: Path) -> None:
-    """Remove a design's files from a folder, and the meshes that it has of the object.
-
-    Raises:
-        OSError: they cannot be removed.
-    """
-    for name in (LAST, *FILES):
-        (directory / name).unlink(missing_ok=True)
-    meshes = directory / FOLDER
-    if meshes.is_dir():
-        for path in meshes.glob(_MESHES):
-            path.unlink()
-        if not any(meshes.iterdir()):
-            meshes.rmdir()
-
-
-def _remove(made: Path, directory: Path) -> None:
-    """Remove a folder that was being written, or the old one that was exchanged for it.
-
-    Args:
-        made: the folder.
-        directory: where what is not of a design goes, if it is not there yet.
-    """
-    if not made.is_dir():
-        made.unlink(missing_ok=True)
-        return
-    remove_files(made)
-    if directory.is_dir():
-        _move_into(made, directory)
-    shutil.rmtree(made, ignore_errors=True)
-
-
-def _move_into(source: Path, target: Path) -> None:
-    """Move what is in one folder into another that has none of that name; folders that both have, likewise."""
-    for each in source.iterdir():
-        there = target / each.name
-        if not os.path.lexists(there):
-            os.rename(each, there)
-        elif each.is_dir() and there.is_dir() and not there.is_symlink():
-            _move_into(each, there)
-
-
-def _move_files(made: Path, directory: Path) -> None:
-    """Move files one by one, the one that makes the folder complete last."""
-    (directory / LAST).unlink(missing_ok=True)
-    remove_files(directory)
-    last = made.with_name(f"{made.name}.{LAST}")
-    os.rename(made / LAST, last)
-    _move_into(made, directory)
-    os.rename(last, directory / LAST)
-
-
-def _exchange(one: Path, other: Path) -> None:
-    """Let two folders change places in one step.
-
-    Raises:
-        OSError: the file system or the kernel cannot.
-    """
-    libc = ctypes.CDLL(None, use_errno=True)
-    paths = os.fsencode(one), os.fsencode(other)
-    try:
-        if sys.platform == "darwin":
-            failed = libc.renamex_np(*paths, ctypes.c_uint(_EXCHANGE))
-        else:
-            failed = libc.renameat2(_AT_FDCWD, paths[0], _AT_FDCWD, paths[1], ctypes.c_uint(_EXCHANGE))
-    except AttributeError as error:
-        raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS)) from error
-    if failed:
-        number = ctypes.get_errno()
-        raise OSError(number, os.strerror(number))
-
-
-def _to_disk(file: Path) -> None:
-    """Have a file written out: some file systems say only then that there is no room."""
-    with file.open("rb") as opened:
-        os.fsync(opened.fileno())
+            clear_away(made, directory)
 
 
 def shown(directory: Path) -> str:

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from casadi_hands.errors import DesignError
 from casadi_hands.export.design import Design
-from casadi_hands.export.place import LAST, shown
+from casadi_hands.export.moving import LAST
+from casadi_hands.export.place import shown
 from casadi_hands.export.record import STATUSES
 from casadi_hands.pipeline.rank import rank_of
 from casadi_hands.task import Task

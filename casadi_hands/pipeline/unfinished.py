@@ -14,7 +14,8 @@ from typing import Any
 import casadi_hands
 from casadi_hands.errors import SolveError
 from casadi_hands.execution.journal import Journal
-from casadi_hands.export.place import LAST, beside, leave_owned, replace_file, resolved, shown
+from casadi_hands.export.moving import LAST, replace_file
+from casadi_hands.export.place import beside, leave_owned, resolved, shown
 from casadi_hands.task import Task, load_task, task_to_yaml
 
 _REQUEST, _TASK, _UNITS, _WRITTEN, _SCRATCH = "request.json", "task.yaml", "units", "written", "scratch"

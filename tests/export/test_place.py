@@ -28,6 +28,7 @@ def filled(text: str, names: tuple[str, ...] = ("task.yaml", "result.json")) -> 
 
     def write(made: Path) -> None:
         for name in names:
+            (made / name).parent.mkdir(exist_ok=True)
             (made / name).write_text(text)
 
     return write
@@ -73,7 +74,7 @@ def test_a_reader_finds_the_old_files_until_the_new_ones_are_all_there(tmp_path:
 @pytest.mark.parametrize("exchanges", [True, False])
 def test_what_is_not_a_design_s_stays(exchanges: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if not exchanges:
-        monkeypatch.setattr(place, "_exchange", full_disk)
+        monkeypatch.setattr(place, "exchange", full_disk)
     (tmp_path / "out/alternatives/seed1").mkdir(parents=True)
     (tmp_path / "out/alternatives/seed1/result.json").write_text("seed")
     (tmp_path / "out/notes.txt").write_text("mine")
@@ -84,6 +85,22 @@ def test_what_is_not_a_design_s_stays(exchanges: bool, tmp_path: Path, monkeypat
         assert (tmp_path / "out/alternatives/seed1/result.json").read_text() == "seed"
     assert (tmp_path / "out").stat().st_mode & 0o777 == 0o750
     assert list(tmp_path.iterdir()) == [tmp_path / "out"]
+
+
+@pytest.mark.parametrize("exchanges", [True, False])
+def test_meshes_go_with_their_design_and_others_stay(
+    exchanges: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not exchanges:
+        monkeypatch.setattr(place, "exchange", full_disk)
+    out = tmp_path / "out"
+    replace_folder(out, filled("first", ("meshes/object0.obj", "meshes/object1.obj", "result.json")))
+    (out / "meshes/mine.obj").write_text("mine")
+    replace_folder(out, filled("second", ("meshes/object0.obj", "result.json")))
+    assert contents(out / "meshes") == {"object0.obj": "second", "mine.obj": "mine"}
+    replace_folder(out, filled("third"))
+    assert contents(out / "meshes") == {"mine.obj": "mine"}
+    assert list(tmp_path.iterdir()) == [out]
 
 
 def test_a_full_disk_leaves_what_was_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,7 +13,8 @@ import pytest
 from casadi_hands import explore, solve
 from casadi_hands.errors import DesignError, SolveError
 from casadi_hands.export.design import Design
-from casadi_hands.export.place import FILES, beside
+from casadi_hands.export.moving import FILES
+from casadi_hands.export.place import beside
 from casadi_hands.nlp import Solver
 from casadi_hands.pipeline import Progress
 from casadi_hands.pipeline.unfinished import is_unfinished, stopped_solve

@@ -11,8 +11,8 @@ from typing import Any
 
 from casadi_hands.errors import DesignError
 from casadi_hands.export.folder import remove_design
+from casadi_hands.export.moving import replace_file
 from casadi_hands.export.page.page import MenuEntry, write_page
-from casadi_hands.export.place import replace_file
 from casadi_hands.export.record import record_text
 from casadi_hands.pipeline.alternatives.ranking import Alternative
 from casadi_hands.pipeline.keeper import Keeper
