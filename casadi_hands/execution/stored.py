@@ -102,7 +102,8 @@ class _Packer:
         if kind in (list, tuple):
             return [kind.__name__, [self.add(item) for item in value]]
         if kind.__module__.partition(".")[0] == _PACKAGE:
-            name = [kind.__module__, kind.__qualname__]
+            named = _named(kind)
+            name = [named.__module__, named.__qualname__]
             if is_dataclass(value):
                 entries = {item.name: self.add(getattr(value, item.name)) for item in fields(value) if item.init}
                 return ["object", name, entries]
@@ -151,6 +152,13 @@ class _Unpacker:
             case ["object", [module, name], entries]:
                 return _data_class(module, name)(**{key: self._item(item) for key, item in entries.items()})
         raise ValueError(f"an unknown kind of value: {str(node)[:40]}")
+
+
+def _named(kind: type) -> type:
+    """The class, or where it was made by one that its module names, from whose fields it is made anew, that one."""
+    return next(
+        each for each in kind.__mro__ if getattr(import_module(each.__module__), each.__qualname__, None) is each
+    )
 
 
 def _data_class(module: str, name: str) -> type:

@@ -134,7 +134,7 @@ def stopped_solve(directory: Path) -> tuple[Task, Request]:
     if request is None:
         done = " a finished result is there" if (directory / LAST).is_file() else " nothing was kept for it"
         raise SolveError(f"{shown(directory)}: no solve into this folder was stopped;{done}")
-    return load_task(place / _TASK), request
+    return load_task(place / _TASK, within=True), request
 
 
 def leave_unfinished() -> None:

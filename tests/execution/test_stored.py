@@ -19,7 +19,7 @@ from casadi_hands.execution.stored import NotStoredError, pack, unpack
 from casadi_hands.problem.si import build_model
 from casadi_hands.task import load_task
 
-PROBLEMS = sorted((Path(__file__).parents[2] / "problems").glob("*.yaml"))
+PROBLEMS = sorted((Path(__file__).parents[2] / "problems").rglob("*.yaml"))
 
 
 def forged(root: Any, nodes: Any, **arrays: np.ndarray) -> bytes:
