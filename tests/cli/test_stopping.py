@@ -116,6 +116,7 @@ def test_one_that_cannot_heed_a_signal_is_ended_all_the_same(task_file: Path, tm
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout
         assert process.stdout.readline() == "solving\n"
+        time.sleep(1.0)
         process.send_signal(signal.SIGTERM)
         assert process.wait(timeout=10) == -signal.SIGKILL
 
