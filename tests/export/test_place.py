@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -182,10 +183,10 @@ def test_a_reader_takes_a_folder_that_was_replaced_meanwhile_anew(
     example_design().save(out)
     again = replace(example_design(), reason="again")
 
-    def late(path: Path) -> object:
+    def late(*given: Any) -> Any:
         monkeypatch.setattr(folder_module, "load_motion", read)
         again.save(out)
-        return read(path)
+        return read(*given)
 
     monkeypatch.setattr(folder_module, "load_motion", late)
     assert Design.load(out).reason == "again"
