@@ -156,8 +156,10 @@ class _Unpacker:
 
 def _named(kind: type) -> type:
     """The class, or where it was made by one that its module names, from whose fields it is made anew, that one."""
-    bases: tuple[type, ...] = kind.__mro__
-    return next(each for each in bases if getattr(import_module(each.__module__), each.__qualname__, None) is each)
+    for each in kind.__mro__:
+        if getattr(import_module(each.__module__), each.__qualname__, None) is each:
+            break
+    return each
 
 
 def _data_class(module: str, name: str) -> type:
