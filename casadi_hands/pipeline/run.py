@@ -37,7 +37,7 @@ from casadi_hands.stages.own_terms import try_out
 from casadi_hands.stages.refine.values import Margin
 from casadi_hands.task import Task
 from casadi_hands.terms.own import OwnTerm, checked
-from casadi_hands.verify.replays.simulation import load_mujoco
+from casadi_hands.verify.replays.engine import load_mujoco
 
 _LOG = logging.getLogger(__name__)
 

@@ -16,8 +16,9 @@ from casadi_hands.errors import DesignError, HandsError
 from casadi_hands.export.mjcf import scene_mjcf
 from casadi_hands.verify import Perturbation, audit_files, replay, replay_many
 from casadi_hands.verify.reading.folder import read_folder
+from casadi_hands.verify.replays.engine import load_mujoco
 from casadi_hands.verify.replays.perturb import draw_perturbation
-from casadi_hands.verify.replays.simulation import SUPPORT, Simulation, load_mujoco
+from casadi_hands.verify.replays.simulation import SUPPORT, Simulation
 from tests.verify.fixture import Scene, carried
 
 

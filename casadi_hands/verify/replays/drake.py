@@ -48,8 +48,9 @@ from casadi_hands.errors import DesignError, HandsError
 from casadi_hands.verify.figures.dynamics import object_rotation
 from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.replays.drake_scene import Motor, Shapes, load_drake, read_mechanics, read_motors, transform
+from casadi_hands.verify.replays.engine import one_line
 from casadi_hands.verify.replays.perturb import Perturbation
-from casadi_hands.verify.replays.simulation import RELEASE, SQUEEZE, SUPPORT, Observer, Plan, one_line
+from casadi_hands.verify.replays.simulation import RELEASE, SQUEEZE, SUPPORT, Observer, Plan
 
 STEP = 2e-3
 """s; half of it changes the object's path by about 0.1 mm at most."""

@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 from casadi_hands.errors import DesignError, HandsError
 from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.reading.markup import read_xml
+from casadi_hands.verify.replays.engine import one_line
 from casadi_hands.verify.replays.perturb import Perturbation
-from casadi_hands.verify.replays.simulation import one_line
 from casadi_hands.verify.shapes import Shape
 
 PRESS = 6.0

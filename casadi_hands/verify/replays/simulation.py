@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +11,13 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation, Slerp
 
-from casadi_hands.errors import DesignError, HandsError
+from casadi_hands.errors import DesignError
 from casadi_hands.verify.figures.attached import object_shots
 from casadi_hands.verify.figures.dynamics import object_rotation
 from casadi_hands.verify.held import held
 from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.replays.actuation import Actuation, OwnMotors, SharedMotors, bias
+from casadi_hands.verify.replays.engine import load_mujoco
 from casadi_hands.verify.replays.mounted import Mounted
 from casadi_hands.verify.replays.perturb import Perturbation
 from casadi_hands.verify.trajectory import build_trajectory
@@ -31,29 +31,6 @@ SUPPORT = 60.0
 
 Observer = Callable[[Any, Any], None]
 """Called with MuJoCo's model and data after every step."""
-
-
-def load_mujoco() -> Any:
-    """The module ``mujoco``.
-
-    Raises:
-        HandsError: it is not installed, or cannot be loaded; the message says which.
-    """
-    try:
-        return import_module("mujoco")
-    # With itself it loads the OpenGL that MUJOCO_GL names, which raises whatever it likes.
-    except Exception as error:
-        if isinstance(error, ModuleNotFoundError) and error.name == "mujoco":
-            raise HandsError("replay needs MuJoCo: pip install mujoco") from None
-        raise HandsError(
-            f"MuJoCo cannot be loaded ({one_line(error)}); try MUJOCO_GL=egl or MUJOCO_GL=osmesa, or MUJOCO_GL=disable "
-            "without a video"
-        ) from None
-
-
-def one_line(error: Exception) -> str:
-    """An error's words without line breaks."""
-    return " ".join(str(error).split())
 
 
 class Plan:

@@ -10,9 +10,9 @@ import numpy as np
 
 from casadi_hands.errors import HandsError
 from casadi_hands.verify.reading.folder import Folder, read_folder
+from casadi_hands.verify.replays.engine import load_mujoco, one_line
 from casadi_hands.verify.replays.perturb import Perturbation
 from casadi_hands.verify.replays.replay import Replay, replay
-from casadi_hands.verify.replays.simulation import load_mujoco, one_line
 
 FRAMES = 30
 """Per second."""
