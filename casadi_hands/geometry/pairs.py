@@ -14,7 +14,7 @@ from casadi_hands.geometry.bodies.sphere import Point
 from casadi_hands.geometry.segments import point_segment_distance, segment_distance
 from casadi_hands.geometry.smooth import clamp, constant
 
-_ROUNDS = 12  # of false position
+_ROUNDS = 9  # of halving and false position
 _TIE = 1e-4  # least bend of a distance along a segment, a share of its squared length over a length
 _STEP = 1e-3  # longest of the last step, a share of the segment
 _ROUNDING = 1e-4  # value of the distance of bodies that cross
@@ -31,7 +31,7 @@ def _segment_and_point(one: Segment, other: Point) -> SX:
 def _segment_and_core(one: Segment, other: Core) -> SX:
     """The least over the segment of the distance from a convex set, which is convex: where its slope vanishes.
 
-    The root is bracketed by the segment's ends and narrowed by false position (Illinois), whose steps are constants to
+    The root is bracketed by the segment's ends and narrowed by halves and by false position, whose steps are constants to
     derivatives; a step of Newton's from where they end has those of the root. Where the segment runs along a face, so
     that all of it is as near, that step is held back.
     """
@@ -46,11 +46,13 @@ def _segment_and_core(one: Segment, other: Core) -> SX:
     below, above = slope(low), slope(high)
     first, last = below >= 0, above <= 0  # where the nearest point is an end
     for _ in range(_ROUNDS):
-        where = within(low, high, below, above)
-        here = slope(where)
-        before = here < 0
-        low, high = ca.if_else(before, where, low), ca.if_else(before, high, where)
-        below, above = ca.if_else(before, here, below / 2), ca.if_else(before, above / 2, here)
+        # By halves, too: along a face the slope is next to nothing until an edge, where it jumps.
+        for where in ((low + high) / 2, None):
+            at = within(low, high, below, above) if where is None else where
+            here = slope(at)
+            before = here < 0
+            low, high = ca.if_else(before, at, low), ca.if_else(before, high, at)
+            below, above = ca.if_else(before, here, below), ca.if_else(before, above, here)
     found = constant(within(low, high, below, above))
     share = SX.sym("share")
     bend = ca.substitute(ca.gradient(slope(share), share), share, found) + _TIE * ca.sumsqr(along)
