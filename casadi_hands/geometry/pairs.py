@@ -31,9 +31,9 @@ def _segment_and_point(one: Segment, other: Point) -> SX:
 def _segment_and_core(one: Segment, other: Core) -> SX:
     """The least over the segment of the distance from a convex set, which is convex: where its slope vanishes.
 
-    The root is bracketed by the segment's ends and narrowed by halves and by false position, whose steps are constants to
-    derivatives; a step of Newton's from where they end has those of the root. Where the segment runs along a face, so
-    that all of it is as near, that step is held back.
+    The root is bracketed by the segment's ends and narrowed by halves and by false position, whose steps are constants
+    to derivatives; a step of Newton's from where they end has those of the root. Where the segment runs along a face,
+    so that all of it is as near, that step is held back.
     """
     along = one.end - one.start
     slope = other.slopes(one.start, along)
