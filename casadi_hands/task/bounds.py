@@ -44,7 +44,7 @@ COUNTS = {
 
 LENGTHS = {"name": 200, "about": 2000}
 """Most characters of texts."""
-_LONGEST_FINGER = 60
+LONGEST_FINGER = 60
 
 MOST_SAMPLES = 3000
 """Of a motion."""
@@ -107,7 +107,7 @@ RANGES = {
 """By the path of a field or its end."""
 ANYTHING = Range(0.0, 1e12)
 """Of every other number."""
-_DIRECTIONS = ("facing", "up", "axis", "quaternion")
+DIRECTIONS = ("facing", "up", "axis", "quaternion")
 SHORTEST_DIRECTION = 1e-100
 """Largest component of a direction that is one."""
 
@@ -149,8 +149,8 @@ def _bound(value: Any, path: tuple[str | int, ...], name: str) -> Iterator[Probl
             return
     if isinstance(value, dict):
         for key, each in value.items():
-            if name == "fingers" and len(key) > _LONGEST_FINGER:
-                allowed = f"names of at most {_LONGEST_FINGER} characters"
+            if name == "fingers" and len(key) > LONGEST_FINGER:
+                allowed = f"names of at most {LONGEST_FINGER} characters"
                 yield Problem(path, f"{shown(key)}, {len(key)} characters", allowed)
                 continue
             inner = name if name == "fingers" else f"{name}.{key}" if name else key
@@ -166,7 +166,7 @@ def _bound(value: Any, path: tuple[str | int, ...], name: str) -> Iterator[Probl
 
 
 def _size(value: float, path: tuple[str | int, ...], name: str) -> Iterator[Problem]:
-    allowed, size = _range_of(name), abs(value)
+    allowed, size = range_of(name), abs(value)
     # What is infinite, and no number, the schema refuses.
     if size != math.inf and size > allowed.most:
         yield Problem(path, shown(value), f"at most {allowed.most:g}{allowed.in_unit} in size")
@@ -183,13 +183,13 @@ def _text(value: str, path: tuple[str | int, ...], name: str) -> Iterator[Proble
 
 
 def _direction(value: Sequence[Any], path: tuple[str | int, ...], name: str) -> Iterator[Problem]:
-    if name.split(".")[-1] not in _DIRECTIONS or not all(isinstance(each, int | float) for each in value):
+    if name.split(".")[-1] not in DIRECTIONS or not all(isinstance(each, int | float) for each in value):
         return
     if 0 < max((abs(each) for each in value), default=0) < SHORTEST_DIRECTION:
         yield Problem(path, shown(value), f"a direction with a number of at least {SHORTEST_DIRECTION:g}")
 
 
-def _range_of(name: str) -> Range:
+def range_of(name: str) -> Range:
     """The range of the longest end of a path that has one."""
     parts = name.split(".")
     if parts[0] in ("limits", "weights"):
