@@ -12,6 +12,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 import casadi_hands
+from casadi_hands.cli.examples import FOLDERS
 
 ROOT = Path(__file__).parents[1]
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -49,6 +50,15 @@ def test_the_lock_has_a_version_that_fits_for_all_that_is_asked_for() -> None:
     versions = locked()
     unmet = [str(each) for each in BUILD + CORE + TESTS if versions[canonicalize_name(each.name)] not in each.specifier]
     assert unmet == []
+
+
+def test_tasks_are_shipped_where_the_program_looks_for_them() -> None:
+    packages = PYPROJECT["tool"]["scikit-build"]["wheel"]["packages"]
+    assert {ROOT / source for source in packages.values()} == {ROOT / "casadi_hands", ROOT / "problems"}
+    places = [FOLDERS[0].relative_to(FOLDERS[0].parents[1]).as_posix() for name in packages if "/" in name]
+    assert places == [name for name in packages if "/" in name]
+    size = sum(path.stat().st_size for path in (ROOT / "problems").rglob("*") if path.is_file())
+    assert size < 1_000_000
 
 
 def test_the_citation_is_of_this_version() -> None:

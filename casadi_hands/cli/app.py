@@ -12,13 +12,13 @@ import typer
 from rich.console import Console
 
 from casadi_hands.cli.options import Folder, Jobs, Seed, Stage, TaskFile
+from casadi_hands.cli.starting import examples, fields, new, schema
 
 app = typer.Typer(
     name="casadi-hands",
     help="Design a robot hand for a task: its fingers, their joints and sizes, its motion and its forces.",
-    epilog="Start with: casadi-hands solve problems/horizontal_translation.yaml",
+    epilog="Start with: `casadi-hands new`, or `casadi-hands examples`; then `casadi-hands solve task.yaml`",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="markdown",
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -40,7 +40,7 @@ def options(
     """Options of the program itself."""
 
 
-@app.command()
+@app.command(epilog="Example: `casadi-hands solve task.yaml --out results/mine --seeds 3`")
 def solve(
     task: Annotated[
         Path | None,
@@ -110,7 +110,7 @@ def solve(
     raise typer.Exit(solve_and_tell(asked))
 
 
-@app.command()
+@app.command(epilog="Example: `casadi-hands formulate task.yaml --out program --stage floating`")
 def formulate(
     task: TaskFile,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder to write.", show_default=False)],
@@ -135,7 +135,7 @@ def formulate(
         print(formulate(problem, stage.value, seed, jobs=jobs, progress=reporter.progress).save(out))
 
 
-@app.command()
+@app.command(epilog="Example: `casadi-hands check task.yaml`")
 def check(task: TaskFile) -> None:
     """Check a task file and print how it is understood; solves nothing. Exits 1 where no hand can do the task."""
     from casadi_hands.cli.task_summary import check_summary
@@ -146,7 +146,7 @@ def check(task: TaskFile) -> None:
     raise typer.Exit(0 if possible else 1)
 
 
-@app.command()
+@app.command(epilog="Example: `casadi-hands view results/task`")
 def view(folder: Folder) -> None:
     """Open a design's page in the browser, made anew where it is not what the folder's other files give."""
     from casadi_hands.export.page.own_page import open_page
@@ -154,7 +154,7 @@ def view(folder: Folder) -> None:
     print(open_page(folder))
 
 
-@app.command()
+@app.command(epilog="Example: `casadi-hands export results/task --to csv`")
 def export(
     folder: Folder,
     to: Annotated[
@@ -178,7 +178,7 @@ def export(
     print(export_design(folder, to, out))
 
 
-@app.command()
+@app.command(epilog="Example: `casadi-hands audit results/task --json`")
 def audit(
     folder: Folder,
     task: Annotated[
@@ -216,7 +216,7 @@ def audit(
     raise typer.Exit(0 if found.certified else 1)
 
 
-@app.command()
+@app.command(epilog="Example: `casadi-hands replay results/task --perturb 10`")
 def replay(
     folder: Folder,
     perturb: Annotated[
@@ -254,9 +254,7 @@ def replay(
     raise typer.Exit(0 if all(figure.holds for figure in played.figures()) else 1)
 
 
-@app.command()
-def fields() -> None:
-    """Print every field of a task file with its default and meaning (Markdown)."""
-    from casadi_hands.task import describe_fields
-
-    print(describe_fields())
+app.command(epilog="Example: `casadi-hands new pill.yaml --shape capsule --size '50 20' --mass 30 --motion turn`")(new)
+app.command(epilog="Example: `casadi-hands examples pencil_pick_up --out pencil.yaml`")(examples)
+app.command(epilog="Example: `casadi-hands fields > task-fields.md`")(fields)
+app.command(epilog="Example: `casadi-hands schema > task.schema.json`")(schema)

@@ -18,6 +18,24 @@ class Stage(StrEnum):
     REFINE = "refine"
 
 
+class Shape(StrEnum):
+    """Shapes that a new task may begin with (``casadi_hands.task.starter.SIZES``)."""
+
+    SPHERE = "sphere"
+    CAPSULE = "capsule"
+    CYLINDER = "cylinder"
+    BOX = "box"
+
+
+class Motion(StrEnum):
+    """What a new task may begin with (``casadi_hands.task.starter.MOTIONS``)."""
+
+    LIFT = "lift"
+    CARRY = "carry"
+    TURN = "turn"
+    TILT = "tilt"
+
+
 TaskFile = Annotated[Path, typer.Argument(metavar="TASK", help="A task file (YAML).", show_default=False)]
 Folder = Annotated[
     Path, typer.Argument(metavar="DIR", help="A folder that `casadi-hands solve` wrote.", show_default=False)
