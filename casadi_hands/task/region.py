@@ -19,7 +19,8 @@ from casadi_hands.task.fields import Positive, Section, Vector, refuse
 
 FEWEST, MOST = 2, 5
 """Fingers that `auto` stands for."""
-_LARGEST = 8
+MOST_COUNTED = 8
+"""Fingers that may be asked for by their number."""
 # What pydantic puts into the places of errors, and files do not have.
 TAGS = ("<point>", "<region>")
 
@@ -96,7 +97,7 @@ def counted_fingers(value: Any) -> Any:
     elif isinstance(value, dict):
         return value
     least, most = value if isinstance(value, list | tuple) and len(value) == 2 else (value, value)
-    if not (type(least) is int and type(most) is int and 1 <= least <= most <= _LARGEST):
+    if not (type(least) is int and type(most) is int and 1 <= least <= most <= MOST_COUNTED):
         names = "a mapping of names, such as thumb: {touches: [0, 0.02, 0]}"
-        raise refuse(f"{names}; or their number, 1 to {_LARGEST}, {{count: [least, most]}}, or auto")
+        raise refuse(f"{names}; or their number, 1 to {MOST_COUNTED}, {{count: [least, most]}}, or auto")
     return {f"finger{i + 1}": {"touches": {}, **({"optional": True} if i >= least else {})} for i in range(most)}

@@ -9,11 +9,13 @@ from typing import Any
 
 from pydantic.fields import FieldInfo
 
+from casadi_hands.task.attached import Attached
 from casadi_hands.task.bounds import COUNTS, DIRECTIONS, LENGTHS, LONGEST_FINGER, range_of
 from casadi_hands.task.fields import Section
 from casadi_hands.task.hand import Ground
 from casadi_hands.task.material import MATERIALS, Material
-from casadi_hands.task.motion import Goal, Perturbation
+from casadi_hands.task.motion import Exert, Goal, Perturbation
+from casadi_hands.task.region import MOST_COUNTED, Region
 from casadi_hands.task.rotation import Rotation
 from casadi_hands.task.servos import SERVOS, Drive
 from casadi_hands.task.shapes import SECTIONS
@@ -26,20 +28,44 @@ SCHEMA_FILE = Path(__file__).with_name("task.schema.json")
 # Later drafts have `prefixItems`, and let keywords stand beside a `$ref`; not all editors know them.
 _DRAFT = "http://json-schema.org/draft-07/schema#"
 _LIST = {"type": "array"}
-_WORDS: dict[type[Section], list[str]] = {Material: list(MATERIALS), Drive: ["remote"], Ground: ["none"]}
+
+
+def _some_of(*names: str) -> dict[str, Any]:
+    """At least one of some fields."""
+    return {"anyOf": [{"required": [name]} for name in names]}
+
+
+_WORDS: dict[type[Section], list[str]] = {
+    Material: list(MATERIALS),
+    Drive: ["remote"],
+    Ground: ["none"],
+    Region: ["anywhere"],
+}
 """What may stand in a section's place."""
+_FORCE_OR_TORQUE = _some_of("force", "torque")
 _RULES: dict[type[Section], dict[str, Any]] = {
     Goal: {
-        "anyOf": [{"required": ["position"]}, {"required": ["tool_at"]}],
+        **_some_of("position", "tool_at", "angle", "distance"),
         "not": {"required": ["position", "tool_at"], "properties": {"position": _LIST, "tool_at": _LIST}},
     },
-    Perturbation: {"anyOf": [{"required": ["force"]}, {"required": ["torque"]}]},
+    Exert: _FORCE_OR_TORQUE,
+    Perturbation: _FORCE_OR_TORQUE,
+    Attached: _some_of(*Attached.model_fields),
     Rotation: {"anyOf": [{"required": ["axis", "degrees"]}, {"required": ["quaternion"], "maxProperties": 1}]},
 }
 """What fields are to others of their section."""
 # Letters and digits of any script: other characters than those are told among ASCII's only.
 _FINGER = {"pattern": r"^(?!ground$)[^\x00-\x20!-,./:-@\[-^`{-\x7f]+$", "maxLength": LONGEST_FINGER}
 _NUMBERS = {"type": "array", "items": {"type": "number"}, "minItems": 4, "maxItems": 4}
+_COUNT = {"type": "integer", "minimum": 1, "maximum": MOST_COUNTED}
+_COUNTS = [_COUNT, {"type": "array", "items": _COUNT, "minItems": 2, "maxItems": 2}]
+_COUNTED = {
+    "type": "object",
+    "properties": {"count": {"anyOf": _COUNTS}},
+    "required": ["count"],
+    "additionalProperties": False,
+}
+_NAMES = {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}
 _QUATERNION = _NUMBERS | {"description": "[w, x, y, z], object to world, of any length but 0; instead of the others."}
 
 
@@ -86,9 +112,17 @@ def _section(raw: dict[str, Any], section: type[Section], prefixes: set[str]) ->
         _bound(value, [prefix + name for prefix in sorted(prefixes)])
     if section is Drive:
         properties["servo"] |= {"enum": [*SERVOS, None]}
+    if section is Region:
+        for name in ("on", "not_on"):
+            properties[name] = {"description": properties[name]["description"], **_NAMES}
+        # YAML 1.1, which other programs write, takes `on` for true.
+        properties |= {name: _NAMES for name in ("true", "True")}
     if section is Task:
         properties["name"] |= {"pattern": r"^[^\n\t]*$"}
-        properties["fingers"] |= {"propertyNames": _FINGER}
+        named = properties["fingers"]
+        text = named.pop("description")
+        named["propertyNames"] = _FINGER
+        properties["fingers"] = {"description": text, "anyOf": [named, _COUNTED, *_COUNTS, {"const": "auto"}]}
     fields = fields_of(section)
     required = [name for name in raw.get("required", ()) if _default(fields[name]) is None]
     whole = {
@@ -125,7 +159,7 @@ def _plain(node: Any) -> Any:
         return [_plain(each) for each in node]
     if not isinstance(node, dict):
         return node
-    if "oneOf" in node:  # nothing else has a choice of kinds
+    if {"$ref": "#/$defs/Sphere"} in node.get("oneOf", ()):
         return {
             "type": "object",
             "properties": {name: {"$ref": f"#/$defs/{section.__name__}"} for name, section in SECTIONS.items()},
@@ -134,6 +168,8 @@ def _plain(node: Any) -> Any:
             "maxProperties": 1,
         }
     plain = {name: _plain(value) for name, value in node.items() if name not in ("title", "prefixItems")}
+    if "oneOf" in plain:
+        plain["anyOf"] = plain.pop("oneOf")
     if "prefixItems" in node:
         plain["items"] = _plain(node["prefixItems"][0])
     return plain

@@ -18,19 +18,31 @@ from casadi_hands.task.task import Task
 from casadi_hands.task.yamlfile import TaskFile
 from tests.task.test_bounds import EXTREME, HEAD
 from tests.task.test_bounds import REFUSED as BEYOND
-from tests.task.test_refusals import DRAWING, GOOD, SPOILT
+from tests.task.test_refusals import DRAWING, FINGERS, GOOD, SPOILT
+from tests.task.test_region import NAMED, REGIONS
+from tests.task.test_region import REFUSED as COUNTED
 from tests.task.test_task_mesh import REFUSED as WITH_MESHES
 from tests.task.test_task_mesh import TASK as MESH
 
 ROOT = Path(__file__).parents[2]
 PROBLEMS = sorted((ROOT / "problems").rglob("*.yaml"))
 SCHEMA = jsonschema.Draft7Validator(task_schema())
+
+
+def without(text: str, more: str) -> str:
+    """A task without the lines that say what others say of the same field."""
+    field = more.partition(":")[0]
+    return "".join(line for line in text.splitlines(keepends=True) if not line.startswith(f"{field}:"))
+
+
 WRONG = {
     **{f"refusal: {name}": GOOD.replace(old, new, 1) for name, (old, new, _) in SPOILT.items()},
     **{f"bound: {name}": HEAD.replace(old, new, 1) for name, (old, new, _) in BEYOND.items()},
+    **{f"fingers: {name}": GOOD.replace(FINGERS, f"{given}\n") for name, (given, _) in COUNTED.items()},
+    **{f"region: {name}": NAMED.replace("[0, 0.02, -0.01]", given) for name, (given, _) in REGIONS.items()},
     **{f"mesh: {name}": MESH.replace(old, new, 1) for name, (old, new, _) in WITH_MESHES.items()},
     **{
-        f"other: {more}": HEAD + more
+        f"other: {more}": without(HEAD, more) + more
         for more in (
             "hand: {material: wood}",
             "hand: {material: {density: 1000, stiffness: 2.0e9}}",
@@ -43,6 +55,9 @@ WRONG = {
             "motors: 0",
             "motors: true",
             "ground: nothing",
+            "fingers: 9",
+            "fingers: many",
+            "fingers: {count: 0}",
         )
     },
 }
@@ -58,7 +73,9 @@ LEFT_TO_CHECK = """
     joint limits reversed; joint limits too wide; angles of axes reversed; one angle of axes alone;
     angles of axes beyond across; angle of axes below along;
     10,000 samples; an hour; a direction that rounds to none; contacts that the surface brings together;
-    in millimetres; no such file; edges too round; another format
+    in millimetres; no such file; edges too round; another format;
+    a shape without that name; no distance; no point; nor not on it;
+    off the object; one against gravity; the wrong way round
 """
 
 
@@ -99,6 +116,11 @@ def test_it_takes_extreme_tasks_and_what_is_written_of_them(name: str) -> None:
     "more",
     [
         "ground: none",
+        "fingers: 3",
+        "fingers: auto",
+        "fingers: [2, 4]",
+        "fingers: {count: [2, 4]}",
+        "fingers: {count: 3}",
         "ground: {}",
         "hand: {drive: remote, material: PETG}",
         "hand: {drive: {servo: XL330-M288}}",
@@ -112,8 +134,19 @@ def test_it_takes_extreme_tasks_and_what_is_written_of_them(name: str) -> None:
     ],
 )
 def test_it_takes_every_way_to_say_a_thing(more: str) -> None:
-    parse_task(HEAD + more)
-    SCHEMA.validate(data(HEAD + more))
+    text = without(HEAD, more) + more
+    parse_task(text)
+    SCHEMA.validate(data(text))
+
+
+@pytest.mark.parametrize(
+    "touches",
+    ["anywhere", "{}", "{near: [0, 0.02, 0], within: 0.01, on: bar}", "{on: [bar]}", "{not_on: bar}", "{true: bar}"],
+)
+def test_it_takes_regions(touches: str) -> None:
+    text = NAMED.replace("[0, 0.02, -0.01]", touches)
+    SCHEMA.validate(data(text))
+    SCHEMA.validate(data(task_to_yaml(parse_task(text))))
 
 
 def test_it_takes_names_of_fingers_in_any_script() -> None:
