@@ -88,6 +88,10 @@ def solve(
     force: Annotated[
         bool, typer.Option("--force", help="Replace whatever result is in the folder, once there is another.")
     ] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only the verdict, in a line.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print what is done, and the verdict, as a line of JSON for each event.")
+    ] = False,
     resume: Annotated[
         Path | None,
         typer.Option(
@@ -106,7 +110,7 @@ def solve(
     """
     from casadi_hands.cli.solving import Asked, solve_and_tell
 
-    asked = Asked(task, out, seed, seeds, start, jobs, executor, until.value, force, resume)
+    asked = Asked(task, out, seed, seeds, start, jobs, executor, until.value, force, resume, quiet, as_json)
     raise typer.Exit(solve_and_tell(asked))
 
 

@@ -12,6 +12,8 @@ from rich.live import Live
 from rich.spinner import Spinner
 from rich.text import Text
 
+from casadi_hands.cli.history import Clock, words
+
 if TYPE_CHECKING:
     from casadi_hands.pipeline import Progress
 
@@ -22,9 +24,9 @@ _EVERY = 5.0
 class Reporter:
     """Tells the user how a solve comes along; a context manager, because the terminal must be given back."""
 
-    def __init__(self, console: Console, questions: Sequence[str] = ()) -> None:
-        """Write to ``console``, first the questions about the task's file."""
-        self._console, self._questions = console, questions
+    def __init__(self, console: Console, questions: Sequence[str] = (), clock: Clock | None = None) -> None:
+        """Write to ``console``, first the questions about the task's file; with a clock also the time that is left."""
+        self._console, self._questions, self._clock = console, questions, clock
         self._start = time.monotonic()
         self._stage, self._text, self._told = "", "loading", -_EVERY
         self._live = Live(self, console=console, transient=True, refresh_per_second=8)
@@ -50,7 +52,7 @@ class Reporter:
 
     def __rich__(self) -> Spinner:
         """The moving line as it is now."""
-        self._spinner.update(text=self._line(self._elapsed, self._stage, self._text))
+        self._spinner.update(text=self._line(self._elapsed, self._stage, self._text, self._left))
         return self._spinner
 
     def note(self, text: str) -> None:
@@ -59,23 +61,31 @@ class Reporter:
 
     def progress(self, news: Progress) -> None:
         """Take the news of the solve."""
+        if self._clock is not None:
+            self._clock.hear(news.stage, news.elapsed)
         if news.stage != self._stage and self._stage and self._live.is_started:
             # What the stage ended with would be overwritten by the next stage's news.
             self._console.print(self._line(news.elapsed, self._stage, self._text))
         due = news.stage != self._stage or news.elapsed - self._told >= _EVERY
         self._stage, self._text = news.stage, news.text
         if due and not self._live.is_started:
-            self._console.print(self._line(news.elapsed, news.stage, news.text), soft_wrap=True)
+            self._console.print(self._line(news.elapsed, news.stage, news.text, self._left), soft_wrap=True)
             self._told = news.elapsed
 
     @property
     def _elapsed(self) -> float:
         return time.monotonic() - self._start
 
+    @property
+    def _left(self) -> str:
+        """The time left in words, empty where it is not known."""
+        return "" if self._clock is None else words(self._clock.left())
+
     @staticmethod
-    def _line(elapsed: float, stage: str, text: str) -> Text:
+    def _line(elapsed: float, stage: str, text: str, left: str = "") -> Text:
         minutes, seconds = divmod(int(elapsed), 60)
         line = Text(f"{minutes:3d}:{seconds:02d}  ")
         if stage:
             line.append(f"{stage.replace('_', ' '):<11} ", style="bold")
-        return line.append(text)
+        line.append(text)
+        return line.append(f"  ({left})", style="dim") if left else line

@@ -10,9 +10,13 @@ from typing import TYPE_CHECKING, Any
 import typer
 from rich.console import Console
 
+from casadi_hands import __version__
+from casadi_hands.cli.events import Events
+from casadi_hands.cli.history import Clock, kind_of, remember, remembered
 from casadi_hands.cli.interrupt import leave_on_interrupt
 from casadi_hands.cli.progress import Reporter
-from casadi_hands.cli.summary import alternatives_summary, design_summary
+from casadi_hands.cli.summary import alternatives_summary, design_summary, headline
+from casadi_hands.errors import HandsError
 from casadi_hands.task import Task
 from casadi_hands.task.loader import load_questioned
 
@@ -37,6 +41,8 @@ class Asked:
     until: str
     force: bool
     resume: Path | None
+    quiet: bool = False
+    as_json: bool = False
 
 
 def solve_and_tell(asked: Asked) -> int:
@@ -46,6 +52,17 @@ def solve_and_tell(asked: Asked) -> int:
         typer.BadParameter: options that do not go together.
         HandsError: what the user can put right.
     """
+    try:
+        return _solve_and_tell(asked)
+    except HandsError as error:
+        if asked.as_json:
+            Events().write("error", text=str(error))
+        raise
+
+
+def _solve_and_tell(asked: Asked) -> int:
+    if asked.quiet and asked.as_json:
+        raise typer.BadParameter("either --quiet or --json", param_hint="--quiet")
     if asked.start is not None and (asked.seeds > 1 or asked.until != LAST_STAGE):
         raise typer.BadParameter(
             "one hand is refined, to the end: give neither --seeds nor --until", param_hint="--from"
@@ -60,29 +77,50 @@ def solve_and_tell(asked: Asked) -> int:
     else:
         problem, folder, seeds, asked = _as_stopped(asked, asked.resume)
         questions = []
-    reporter = Reporter(Console(stderr=True), questions)
+    clock = _clock(problem, asked, seeds)
+    console = Console(stderr=True, quiet=asked.quiet)
+    reporter = Events(questions, clock) if asked.as_json else Reporter(console, questions, clock)
     with leave_on_interrupt(lambda: _stopped(reporter, folder)), reporter:
         # Within the reporter, because CasADi and Pinocchio take seconds to load.
         design, ranked = _solved(problem, folder, seeds, asked, reporter)
         from casadi_hands.pipeline.unfinished import is_unfinished
 
         outdone = is_unfinished(folder)
+    if clock is not None:
+        remember(clock.ended())
+    status = 1 if design.status == "failed" else 0
+    outdone_by = (
+        f"the result in {folder} is better than this one, and stays; casadi-hands solve --resume {folder} --force"
+    )
+    outdone_by += " puts this one there"
+    if isinstance(reporter, Events):
+        if outdone:
+            reporter.note(outdone_by)
+        reporter.result(design, folder, status)
+        return status
     console = Console()
+    if asked.quiet:
+        console.print(headline(design, folder), soft_wrap=True)
+        return status
     console.print(design_summary(design, folder))
     if ranked:
         console.print(alternatives_summary(ranked, folder))
     if outdone:
-        console.print(
-            f"the result in {folder} is better than this one, and stays; "
-            f"casadi-hands solve --resume {folder} --force puts this one there",
-            soft_wrap=True,
-            markup=False,
-        )
-    return 1 if design.status == "failed" else 0
+        console.print(outdone_by, soft_wrap=True, markup=False)
+    return status
+
+
+def _clock(problem: Task, asked: Asked, seeds: tuple[int, ...] | None) -> Clock | None:
+    """What tells the time left; a solve that goes on, or runs elsewhere, is like none."""
+    if asked.resume is not None or asked.executor is not None:
+        return None
+    many, warm = len(seeds or (0,)), asked.start is not None
+    kind = kind_of(problem, version=__version__, until=asked.until, seeds=many, jobs=asked.jobs, warm=warm)
+    return Clock(kind, remembered())
 
 
 def _solved(
-    problem: Task, folder: Path, seeds: tuple[int, ...] | None, asked: Asked, reporter: Reporter
+    problem: Task, folder: Path, seeds: tuple[int, ...] | None, asked: Asked, reporter: Reporter | Events
 ) -> tuple[Design, list[Alternative]]:
     """The design and, of several seeds, what each gave."""
     import casadi_hands.pipeline as pipeline
@@ -120,7 +158,7 @@ def _as_stopped(asked: Asked, folder: Path) -> tuple[Task, Path, tuple[int, ...]
     return problem, folder, request.seeds, replace(asked, until=request.until, start=start, force=force)
 
 
-def _stopped(reporter: Reporter, folder: Path) -> None:
+def _stopped(reporter: Reporter | Events, folder: Path) -> None:
     """Last words before the program ends at once."""
     reporter.stop()
     # Written last, so a folder that has it is complete.

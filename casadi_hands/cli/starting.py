@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -50,7 +50,7 @@ def new(
     from casadi_hands.task.loader import load_questioned
     from casadi_hands.task.starter import Idea, starter
 
-    given = {
+    given: dict[str, Any] = {
         "shape": None if shape is None else shape.value,
         "size": None if size is None else numbers(size),
         "mass": mass,
@@ -59,9 +59,10 @@ def new(
         "fingers": fingers,
         "table": table,
     }
-    idea = Idea(name or file.stem, **{what: value for what, value in given.items() if value is not None})
+    known = {what: value for what, value in given.items() if value is not None}
+    idea = Idea(name or file.stem, **known)
     if sys.stdin.isatty():
-        idea = ask(idea, {what for what, value in given.items() if value is not None})
+        idea = ask(idea, known.keys())
     write_new(file, starter(idea))
     text, possible = check_summary(*load_questioned(file))
     Console().print(text)

@@ -51,6 +51,11 @@ def design_summary(design: Design, folder: Path) -> RenderableType:
     return Group(*parts)
 
 
+def headline(design: Design, folder: Path) -> RenderableType:
+    """How a solve ended, in a line."""
+    return Text.assemble(_headline(design.task.name, design.status), f" ({folder})")
+
+
 def alternatives_summary(ranked: Sequence[Alternative], folder: Path) -> RenderableType:
     """What each seed gave, best first, and where it is."""
     table = Table("seed", "status", "joints", box=SIMPLE_HEAD)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from casadi_hands.errors import TaskError
@@ -208,7 +208,7 @@ def _contacts(idea: Idea, tip: float) -> list[tuple[str, tuple[float, float, flo
     return list(zip(names, points, strict=True))
 
 
-def _allow(what: str, given: str, allowed: Sequence[str] | dict[str, object]) -> None:
+def _allow(what: str, given: str, allowed: Collection[str]) -> None:
     if given not in allowed:
         raise TaskError(f"{what}: given {escaped(given)}; allowed: {', '.join(allowed)}")
 
