@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path as FilePath
+from typing import Any
 
 from pydantic import ValidationError
 
 from casadi_hands.errors import TaskError
 from casadi_hands.task.bounds import bound, bound_together
 from casadi_hands.task.checks import check
+from casadi_hands.task.given import Given, TaskData, plain
 from casadi_hands.task.mesh import FOLDER, WITHIN
 from casadi_hands.task.messages import explain
 from casadi_hands.task.normalise import normalise
@@ -24,11 +27,11 @@ from casadi_hands.task.yamlfile import TaskFile
 _MOST = 50  # mistakes that are looked at; a message has room for fewer
 
 
-def load_task(path: str | FilePath, within: bool = False) -> Task:
-    """Read a task file.
+def load_task(path: str | FilePath | Mapping[str, Any], within: bool = False) -> Task:
+    """Read a task file, or take a task's fields from a mapping.
 
     Args:
-        path: the YAML file.
+        path: the YAML file; or its fields, as it would give them, in which lists may be arrays.
         within: whether files that it names have to be in its folder, as for one that others may have written.
 
     Returns:
@@ -38,6 +41,8 @@ def load_task(path: str | FilePath, within: bool = False) -> Task:
     Raises:
         TaskError: the file cannot be read or used; a line for each thing that is wrong.
     """
+    if isinstance(path, Mapping):
+        return _taken(plain(path), within=within)
     return load_questioned(path, within)[0]
 
 
@@ -69,7 +74,15 @@ def parse_questioned(
     text: str, source: str = "task", name: str = "task", folder: FilePath | None = None, within: bool = False
 ) -> tuple[Task, list[str]]:
     """Build a task from the text of a task file, like `load_questioned`."""
-    file = TaskFile(text, source)
+    return _build(TaskFile(text, source), name, folder, within)
+
+
+def _taken(data: dict[str, Any], name: str = "task", folder: FilePath | None = None, within: bool = False) -> Task:
+    """Build a task from fields."""
+    return _build(TaskData(data), name, folder, within)[0]
+
+
+def _build(file: TaskFile | TaskData, name: str, folder: FilePath | None, within: bool) -> tuple[Task, list[str]]:
     problems = bound(file.data)
     if problems:
         raise _refusal(problems, file)
@@ -87,13 +100,14 @@ def parse_questioned(
     problems = problems or bound(task.model_dump(by_alias=True, exclude_none=True))
     if problems:
         raise _refusal(problems, file)
+    task.was_given(Given(file.data, partial(_taken, name=name, folder=folder, within=within)))
     return task, _lines(questions, file)
 
 
-def _refusal(problems: list[Problem], file: TaskFile, more: int = 0) -> TaskError:
+def _refusal(problems: list[Problem], file: TaskFile | TaskData, more: int = 0) -> TaskError:
     return TaskError(joined(_lines(problems, file), more))
 
 
-def _lines(found: Sequence[Problem | Question], file: TaskFile) -> list[str]:
+def _lines(found: Sequence[Problem | Question], file: TaskFile | TaskData) -> list[str]:
     lines = sorted((file.line(each.path), str(each)) for each in found)
-    return [f"{file.source}:{line}: {text}" for line, text in lines]
+    return [f"{file.source}:{line}: {text}" if line else f"{file.source}: {text}" for line, text in lines]

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated, Any, Literal
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
+from pydantic import BeforeValidator, Field, PrivateAttr, ValidationInfo, field_validator
 
+from casadi_hands.errors import TaskError
 from casadi_hands.motion import nearest_exponential
 from casadi_hands.task.fields import Positive, Section, Vector, Whole, fill, follows, refuse
+from casadi_hands.task.given import Given, merged, plain
 from casadi_hands.task.hand import (
     SHORTEST_LINK,
     Actuator,
@@ -84,6 +86,8 @@ class Task(Section):
     limits: Limits = Field(default={}, validate_default=True, description="Limits of the certificate.")
     search: Search = Field(default=Search(), description="The search over structures.")
     weights: Weights = Field(default=Weights(), description="Weights of the soft stages' cost terms.")
+
+    _given: Given = PrivateAttr(default_factory=Given)
 
     # Defaults that follow from other sections. Where such a section is itself wrong the task is refused anyway,
     # and any valid number will do to let the rest of this section be checked.
@@ -176,6 +180,35 @@ class Task(Section):
             force, moment = hinge_loads(hand.material, hand.safety_factor, hand.link_radius)
             usual |= {"bearing_force": force, "bearing_moment": moment}
         return fill(value, least_stiffness=motor.stiffness, **usual)
+
+    def changed(self, **changes: Any) -> Task:
+        """The task with some fields changed, checked as a file is that has them so; defaults follow anew.
+
+        Args:
+            changes: new values by field, as a file would give them. In mappings, what is not named stays as it is:
+                ``changed(hand={"bend": 0}, friction=0.4)``. None gives a field its default back.
+
+        Raises:
+            TaskError: the fields make no task; a line for each thing that is wrong. Or the task is not of `load_task`.
+        """
+        if self._given.make is None:
+            raise TaskError("a task can be changed that load_task gave; this one was made of sections")
+        data = self._given.data
+        if data is None:
+            data = plain(self.model_dump(by_alias=True, exclude_none=True))
+        return self._given.make(merged(data, plain(changes)))
+
+    def was_given(self, given: Given) -> None:
+        """Remember what the task was made of."""
+        self._given = given
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A copy with other values, which are not checked; `changed` checks them."""
+        copy = super().model_copy(update=update, deep=deep)
+        if update:
+            fields = copy.model_dump(by_alias=True, exclude_none=True, include=set(update))
+            copy.was_given(self._given.updated(plain(fields)))
+        return copy
 
     @property
     def draws(self) -> bool:
