@@ -6,14 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from shutil import copyfile
 
-import casadi_hands
 from casadi_hands.errors import HandsError
 from casadi_hands.task.schema import schema_line
 from casadi_hands.task.shown import escaped
 from casadi_hands.task.textfile import read
 from casadi_hands.task.yamlfile import TaskFile
 
-_PACKAGE = Path(casadi_hands.__file__).parent
+_PACKAGE = Path(__file__).resolve().parents[1]
 FOLDERS = (_PACKAGE / "problems", _PACKAGE.parent / "problems")
 """Where they are: the first that is there."""
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 from rich.console import Console
 
-from casadi_hands import __version__
 from casadi_hands.cli.events import Events
 from casadi_hands.cli.history import Clock, kind_of, remember, remembered
 from casadi_hands.cli.interrupt import leave_on_interrupt
@@ -115,7 +115,7 @@ def _clock(problem: Task, asked: Asked, seeds: tuple[int, ...] | None) -> Clock 
     if asked.resume is not None or asked.executor is not None:
         return None
     many, warm = len(seeds or (0,)), asked.start is not None
-    kind = kind_of(problem, version=__version__, until=asked.until, seeds=many, jobs=asked.jobs, warm=warm)
+    kind = kind_of(problem, version=version("casadi-hands"), until=asked.until, seeds=many, jobs=asked.jobs, warm=warm)
     return Clock(kind, remembered())
 
 

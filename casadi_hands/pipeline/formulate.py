@@ -23,7 +23,7 @@ from casadi_hands.nlp.solver import Solve, keep_solves
 from casadi_hands.pipeline.certify import refinable
 from casadi_hands.pipeline.margins import margins_for
 from casadi_hands.pipeline.placing import place
-from casadi_hands.pipeline.record import STAGES, Progress, Record
+from casadi_hands.pipeline.record import STAGES, Progress, Record, Stage
 from casadi_hands.pipeline.steps import prepare_search, run_floating, run_search, run_whole_hand
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
@@ -109,7 +109,7 @@ class Formulation:
 
 def formulate(
     task: Task,
-    stage: str = "refine",
+    stage: Stage = "refine",
     seed: int | None = None,
     *,
     jobs: int | None = None,

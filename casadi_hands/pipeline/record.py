@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 from casadi_hands.diagnosis.reason import Reason
 from casadi_hands.execution.journal import Journal
@@ -19,7 +19,8 @@ from casadi_hands.task import Task
 from casadi_hands.terms.catalogue import single
 from casadi_hands.terms.own import OwnTerm
 
-STAGES = ("floating", "synthesis", "whole_hand", "refine")
+Stage = Literal["floating", "synthesis", "whole_hand", "refine"]
+STAGES: tuple[Stage, ...] = get_args(Stage)
 
 
 @dataclass(frozen=True)

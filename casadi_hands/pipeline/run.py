@@ -24,7 +24,7 @@ from casadi_hands.pipeline.couplings import Coupler
 from casadi_hands.pipeline.judge import Judge, counted
 from casadi_hands.pipeline.placing import ATTEMPTS, place, placed_like, unplaceable
 from casadi_hands.pipeline.rank import rank_of
-from casadi_hands.pipeline.record import STAGES, Progress, Record
+from casadi_hands.pipeline.record import STAGES, Progress, Record, Stage
 from casadi_hands.pipeline.refiner import Refiner
 from casadi_hands.pipeline.solving import solving
 from casadi_hands.pipeline.steps import adopt, prepare_search, run_floating, run_search, run_whole_hand
@@ -47,9 +47,9 @@ def solve(
     *,
     seed: int | None = None,
     jobs: int | None = None,
-    until: str = "refine",
-    out: Path | None = None,
-    start: Path | None = None,
+    until: Stage = "refine",
+    out: str | Path | None = None,
+    start: str | Path | None = None,
     executor: Executor | None = None,
     progress: Callable[[Progress], None] | None = None,
     terms: Sequence[OwnTerm] = (),
@@ -89,6 +89,7 @@ def solve(
             holds a result that is certified, or of another task, and is not to be replaced.
         HandsError: MuJoCo, which designs are replayed in, cannot be loaded.
     """
+    out, start = None if out is None else Path(out), None if start is None else Path(start)
     if until not in STAGES:
         raise SolveError(f"until: given {until!r}; allowed: {', '.join(STAGES)}")
     if start is not None and until != STAGES[-1]:

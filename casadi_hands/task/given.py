@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from os import PathLike, fspath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,9 +13,6 @@ from casadi_hands.errors import TaskError
 from casadi_hands.task.nodes import MOST_LEVELS, too_deep
 from casadi_hands.task.problem import Problem
 from casadi_hands.task.shown import shown, unprintable
-
-if TYPE_CHECKING:
-    from casadi_hands.task.task import Task
 
 INDEPENDENT = frozenset(("search", "weights", "limits", "name", "about"))
 """Fields from which no others follow, and which no change of frames touches."""
@@ -31,7 +28,7 @@ class Given:
     """
 
     data: dict[str, Any] | None = None
-    make: Callable[[dict[str, Any]], Task] | None = None
+    make: Callable[[dict[str, Any]], Any] | None = None
 
     def __eq__(self, other: object) -> bool:
         """Not what tasks differ in."""

@@ -196,7 +196,8 @@ class Task(Section):
         data = self._given.data
         if data is None:
             data = plain(self.model_dump(by_alias=True, exclude_none=True))
-        return self._given.make(merged(data, plain(changes)))
+        changed: Task = self._given.make(merged(data, plain(changes)))
+        return changed
 
     def was_given(self, given: Given) -> None:
         """Remember what the task was made of."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from casadi_hands import __version__
 from casadi_hands.cli.history import Solve, kind_of, remember, remembered
 from casadi_hands.errors import SolveError
 from tests.cli.test_app import run, solve_gives, task_file  # noqa: F401
@@ -17,7 +17,7 @@ from tests.export.example import example_design, example_task
 
 
 def remember_three(seconds: float, **changes: Any) -> None:
-    settings = {"version": __version__, "until": "refine", "seeds": 1, "jobs": 2, "warm": False} | changes
+    settings = {"version": version("casadi-hands"), "until": "refine", "seeds": 1, "jobs": 2, "warm": False} | changes
     kind = kind_of(example_task(), **settings)
     for _ in range(3):
         remember(Solve(kind, seconds, {"": 0.0, "floating": 0.0, "synthesis": 0.1}))
@@ -46,7 +46,7 @@ def test_a_solve_is_remembered_with_when_its_stages_began(
     run("solve", task_file, "--jobs", 2)
     (kept,) = remembered()
     assert kept.began == {"": 0.0, "floating": 0.0, "synthesis": 6.5}
-    assert (kept.kind.jobs, kept.kind.version) == (2, __version__)
+    assert (kept.kind.jobs, kept.kind.version) == (2, version("casadi-hands"))
 
 
 def test_quiet_prints_the_verdict_alone(

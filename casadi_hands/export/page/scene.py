@@ -81,7 +81,7 @@ def draw_scene(design: Result) -> Scene:
     """
     task = design.task
     meshes = {mesh_path(name): (solid.vertices, solid.triangles) for name, solid in polytopes(task).items()}
-    hand, item = Robot(hand_urdf(design.hand or _bare_palm(design))), Robot(object_urdf(task), meshes)
+    hand, item = Robot(hand_urdf(design.hand or bare_palm(design))), Robot(object_urdf(task), meshes)
     timeline = design_timeline(design, hand)
     middle, radius = _bounds(timeline, hand, item, goal_poses(task))
     visualizer, recorder = recording()
@@ -101,7 +101,7 @@ def draw_scene(design: Result) -> Scene:
     return Scene(recorder.commands, timeline.time, eye_towards(task.palm.rotation[:, 2]), _legend(design), force)
 
 
-def _bare_palm(design: Result) -> Hand:
+def bare_palm(design: Result) -> Hand:
     """The task's palm as a hand without fingers, for which limits and density mean nothing."""
     palm = design.task.palm
     return Hand(palm.radius, palm.thickness, (), 0.0, 0.0, 0.0, 0.0, design.task.hand.density)

@@ -15,7 +15,7 @@ from casadi_hands.errors import DesignError, SolveError
 from casadi_hands.execution.journal import Journal
 from casadi_hands.export.design import Design
 from casadi_hands.export.place import owned
-from casadi_hands.pipeline import STAGES, Progress, solve
+from casadi_hands.pipeline import STAGES, Progress, Stage, solve
 from casadi_hands.pipeline.alternatives.folder import remove_alternatives, remove_surplus, seed_folder, write_ranking
 from casadi_hands.pipeline.alternatives.ranking import Alternative, rank
 from casadi_hands.pipeline.keeper import Keeper
@@ -30,7 +30,7 @@ def explore(
     *,
     seeds: Sequence[int],
     jobs: int | None = None,
-    until: str = "refine",
+    until: Stage = "refine",
     out: Path | str | None = None,
     executor: Executor | None = None,
     progress: Callable[[Progress], None] | None = None,
