@@ -20,7 +20,7 @@ if __name__ == "__main__":
     task = load_task("task.yaml")
     low = Cost("low", height, stage="floating", weight=5.0)
     gentle = Bound("gentle", pressing, stage="floating", upper=1.2**2)
-    for terms in ([], [low, gentle]):
+    for terms in ((), (low, gentle)):
         design = solve(task, until="floating", terms=terms)
         motion = design.motion
         print(f"down to {motion.object_position[:, 2].min():.4f} m, at most", end=" ")

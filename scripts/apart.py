@@ -11,19 +11,22 @@ import sys
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from casadi_hands.errors import DesignError
 from casadi_hands.export.design import Design
 from casadi_hands.export.place import beside, owned
 from casadi_hands.task import Task, task_to_yaml
 
+if TYPE_CHECKING:
+    from casadi_hands.pipeline import Stage
+
 ENDED = "ended.json"
 """Written into a folder whose solve did not end by itself: ``{"how": sentence, "minutes": limit or null}``."""
 LOG = "solve.log"
 
 
-def solve_apart(task: Task, folder: Path, until: str, jobs: int | None, limit: float | None) -> Design:
+def solve_apart(task: Task, folder: Path, until: Stage, jobs: int | None, limit: float | None) -> Design:
     """Solve a task and write its result folder, whatever becomes of the solve.
 
     The work is done beside ``folder`` and moved there at the end, so that a folder with this name is never half of one.
@@ -82,7 +85,7 @@ def ended(folder: Path) -> dict[str, Any]:
     return known
 
 
-def _work(task: Task, folder: Path, until: str, jobs: int | None) -> None:
+def _work(task: Task, folder: Path, until: Stage, jobs: int | None) -> None:
     """The solve, in its own process and session: its workers can be ended with it."""
     os.setsid()
     log = (folder / LOG).open("w", buffering=1, encoding="utf-8")

@@ -8,7 +8,7 @@ from argparse import ArgumentDefaultsHelpFormatter, ArgumentParser
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from apart import ended, read_apart, solve_apart
 
@@ -16,12 +16,15 @@ from casadi_hands.export.design import Design
 from casadi_hands.task import Task, load_task, task_to_yaml
 from casadi_hands.verify import replay, replay_many
 
+if TYPE_CHECKING:
+    from casadi_hands.pipeline import Stage
+
 SEEDS = (0, 1, 2, 3, 4)
 NOTHING = "–"
 
 
 def kept_solve(
-    task_file: Path, seed: int, until: str, root: Path, jobs: int | None, limit: float | None = None
+    task_file: Path, seed: int, until: Stage, root: Path, jobs: int | None, limit: float | None = None
 ) -> tuple[Design, Path]:
     """Solve a task, or read the result if ``root`` already has one of the same task and seed.
 
@@ -50,7 +53,7 @@ def kept_solve(
     return solve_apart(task, folder, until, jobs, limit), folder
 
 
-def result_folder(task_file: Path, seed: int, until: str, root: Path) -> Path:
+def result_folder(task_file: Path, seed: int, until: Stage, root: Path) -> Path:
     """Where `kept_solve` keeps a result."""
     return root / f"{task_file.stem}-{seed}-{until}"
 
