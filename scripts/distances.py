@@ -9,6 +9,7 @@ polytopes trimesh measures as many points, too. Lengths are in half the shape's 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import casadi as ca
 import coal
@@ -107,9 +108,11 @@ def _links(
 
 def _points(count: int, body: Convex) -> tuple[Array, Array]:
     """Distances of points by trimesh, positive outside, and what is missed."""
-    hull = trimesh.PointCloud(np.asarray(body.vertices)).convex_hull
+    cloud: Any = trimesh.PointCloud  # trimesh has types for a part of itself
+    hull = cloud(np.asarray(body.vertices)).convex_hull
+    signed_distance: Any = trimesh.proximity.signed_distance
     points = np.random.default_rng(0).uniform(-1.5, 1.5, (count, 3))
-    truths = -trimesh.proximity.signed_distance(hull, points)
+    truths = -signed_distance(hull, points)
     return truths, np.array([body.signed_distance(point) for point in points]) - truths
 
 

@@ -58,7 +58,7 @@ _SHARE = Range(1e-6, 1e6)
 RANGES = {
     "object.mass": Range(1e-6, 1e5, "kg"),
     "object.inertia": Range(0.0, 1e12, "kg·m²"),
-    "gravity": Range(0.0, 1e3, "m/s²"),
+    "gravity": Range(0.0, 2e4, "m/s²"),
     "friction": Range(1e-3, 100.0),
     "center": _PLACE,
     "center_of_mass": _PLACE,
