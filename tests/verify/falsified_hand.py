@@ -229,7 +229,7 @@ HIDDEN: Cases = {
     "two objects": (added(OBJECT, ".", f"<link name='object'>{MASS}{BALL}</link>"), r"two <link name=\"object\">"),
     "an object without geometry": (
         removed(OBJECT, "link/collision"),
-        r"no link 'object' made of spheres, capsules and cylinders",
+        r"no link 'object' made of shapes of the kinds sphere, capsule",
     ),
     "a smaller object": (
         edited(OBJECT, ".//*[@radius]", lambda e, p: e.set("radius", "0.01"), every=True),
