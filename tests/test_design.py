@@ -15,7 +15,7 @@ from casadi_hands.export.folder import save_design
 from casadi_hands.task import parse_task
 from tests.export.example import TASK, example_design
 
-FOR_PEOPLE = {"motion.csv", "viewer.html"}
+FOR_PEOPLE = {"motion.csv", "viewer.html", "report.html"}
 KEPT = {"joint_angles", "joint_names"}
 FILES = FOR_PEOPLE | {"task.yaml", "hand.urdf", "object.urdf", "scene.xml", "motion.npz", "result.json"}
 
@@ -190,7 +190,8 @@ def test_a_failed_design_keeps_what_exists(tmp_path):
 
 def test_a_smaller_design_leaves_nothing_of_the_one_before(saved):
     Design(task=parse_task(TASK), status="failed", reason="nothing tried").save(saved)
-    assert {path.name for path in saved.iterdir()} == {"task.yaml", "object.urdf", "result.json", "viewer.html"}
+    pages = {"viewer.html", "report.html"}
+    assert {path.name for path in saved.iterdir()} == {"task.yaml", "object.urdf", "result.json", *pages}
 
 
 def test_numbers_that_are_not_finite_are_null(tmp_path):

@@ -29,7 +29,7 @@ from tests.stages.synthesis import example
 PROBLEMS = Path(__file__).parents[1] / "problems"
 CAPSULE = PROBLEMS / "horizontal_translation.yaml"
 ALWAYS = {"result.json", "task.yaml", "motion.npz", "motion.csv", "object.urdf"}
-OF_A_HAND = {"hand.urdf", "scene.xml", "viewer.html"}
+OF_A_HAND = {"hand.urdf", "scene.xml", "viewer.html", "report.html"}
 # Two fingers carry a ball 1.5 cm to the side, above a palm that looks up.
 BALL = f"name: ball{example.BALL}search: {{trials: 3, recombinations: 2, max_joints: 2}}\n"
 RADIUS = 0.13 * 0.06  # of its fingers' links, m

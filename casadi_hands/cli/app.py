@@ -158,6 +158,14 @@ def view(folder: Folder) -> None:
     print(open_page(folder))
 
 
+@app.command(epilog="Example: `casadi-hands report results/horizontal_translation`")
+def report(folder: Folder) -> None:
+    """Write a design's report.html anew, and print where: dimensions, plots, checks, motors, costs, other hands."""
+    from casadi_hands.export.report.folder import report_folder
+
+    print(report_folder(folder))
+
+
 @app.command(epilog="Example: `casadi-hands export results/task --to csv`")
 def export(
     folder: Folder,

@@ -15,6 +15,7 @@ from casadi_hands.export.moving import remove_files
 from casadi_hands.export.page.page import write_page
 from casadi_hands.export.place import replace_folder, shown
 from casadi_hands.export.record import STATUSES, design_record, hand_from_record, record_text
+from casadi_hands.export.report.page import REPORT, write_report
 from casadi_hands.export.table import motion_table
 from casadi_hands.export.urdf import hand_urdf, object_urdf
 from casadi_hands.problem.result import Result
@@ -31,7 +32,7 @@ def save_design(design: Result, directory: Path, page: bool = True) -> None:
     Args:
         design: whole or partial (hand or motion None).
         directory: made if it does not exist.
-        page: write the viewer and the motion as a table too, which takes longer than all the rest.
+        page: write the viewer, the report and the motion as a table too, which takes longer than all the rest.
 
     Raises:
         DesignError: the folder cannot be written, another process writes it, or the design holds what cannot be.
@@ -77,6 +78,7 @@ def write_files(design: Result, directory: Path, page: bool = True) -> None:
             (directory / "motion.csv").write_text(motion_table(motion), encoding="utf-8")
     if page:
         write_page(design, directory / "viewer.html")
+        write_report(design, directory / REPORT)
     (directory / "result.json").write_text(record_text(design_record(design)), encoding="utf-8")
 
 

@@ -25,6 +25,7 @@ FILES = (
     "placement.json",
     LAST,
     "viewer.html",
+    "report.html",
 )
 """A design's files; whatever else is in its folder stays there."""
 

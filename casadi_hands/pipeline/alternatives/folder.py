@@ -14,6 +14,8 @@ from casadi_hands.export.folder import remove_design
 from casadi_hands.export.moving import replace_file
 from casadi_hands.export.page.page import MenuEntry, write_page
 from casadi_hands.export.record import record_text
+from casadi_hands.export.report.alternatives import read_alternatives
+from casadi_hands.export.report.page import REPORT, write_report
 from casadi_hands.pipeline.alternatives.ranking import Alternative
 from casadi_hands.pipeline.keeper import Keeper
 
@@ -28,7 +30,7 @@ def seed_folder(directory: Path, seed: int) -> Path:
 
 
 def write_ranking(ranked: Sequence[Alternative], directory: Path, keeper: Keeper, last: bool) -> None:
-    """Write the best design into the folder itself, the ranking, and the menus of the pages of what is kept.
+    """Write the best design into the folder itself, the ranking, the menus of what is kept, and the report of all.
 
     The folders of the seeds must have been written.
 
@@ -52,6 +54,9 @@ def write_ranking(ranked: Sequence[Alternative], directory: Path, keeper: Keeper
                 _write_menu(kept, kept[0], directory, f"{FOLDER}/")
             for one in kept:
                 _write_menu(kept, one, seed_folder(directory, one.seed), "../")
+        if keeper.rival is None:
+            seeds = read_alternatives(directory)
+            replace_file(directory / REPORT, lambda path: write_report(ranked[0].design, path, seeds))
     except OSError as error:
         raise DesignError(f"{directory}: cannot write the alternatives here: {error}") from error
 
