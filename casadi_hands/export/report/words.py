@@ -23,6 +23,7 @@ _FIGURES = {
     "torsion_excess": "Twisting moment beyond what a fingertip bears",
     "torsion_shortfall": "Twisting moment that does not oppose a spin",
     "torsion_use": "Share of the fingertips' torsion in use",
+    "attachment_shortfall": "Force or moment that the joint to the world cannot exert",
     "pull": "Force by which a contact would have to suck",
     "slide_shortfall": "Friction that does not oppose a slide",
     "gap": "Gap between finger and object",

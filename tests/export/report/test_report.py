@@ -15,7 +15,9 @@ from casadi_hands.export.report.alternatives import read_alternatives
 from casadi_hands.export.report.folder import report_folder
 from casadi_hands.export.report.markup import number, percent, signed
 from casadi_hands.export.report.page import report_text
+from casadi_hands.export.report.words import figure_title, plain
 from casadi_hands.task import parse_task
+from tests.documents import ROOT
 from tests.export.example import TASK, example_design, example_hand, example_task
 
 NASTY = "</script><script>window.hacked = true</script><img src=x onerror='window.hacked = true'>"
@@ -123,6 +125,14 @@ def test_what_is_missed_comes_first_with_its_reason():
     assert "20 % of 0.05 mm" in text
     assert "1 of 2 limits are kept" in text
     assert "Contact &#x27;thumb&#x27; slips 10 mm; another seed." in text
+
+
+def test_every_figure_that_the_documents_explain_has_words_of_its_own():
+    table = (ROOT / "docs" / "reading-the-verdict.md").read_text().split("## The figures")[1]
+    first = [line.split("|")[1] for line in table.splitlines() if line.startswith("| `")]
+    names = [name for cell in first for name in re.findall("`(.+?)`", cell)]
+    assert len(names) > 30
+    assert [name for name in names if figure_title(name) == plain(name)] == []
 
 
 def test_a_least_value_is_told_as_one():
