@@ -158,7 +158,7 @@ def view(folder: Folder) -> None:
     print(open_page(folder))
 
 
-@app.command(epilog="Example: `casadi-hands report results/horizontal_translation`")
+@app.command(epilog="Example: `casadi-hands report results/task`")
 def report(folder: Folder) -> None:
     """Write a design's report.html anew, and print where: dimensions, plots, checks, motors, costs, other hands."""
     from casadi_hands.export.report.folder import report_folder
