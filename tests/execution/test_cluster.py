@@ -121,7 +121,7 @@ def refused(address: str) -> str:
 
 @pytest.mark.parametrize("address", ["ray://here:1", "dask://here", "dask://:8786", "tcp://here:1", "dask://a:1/b"])
 def test_another_form_of_address_is_refused(address: str) -> None:
-    assert refused(address) == f"executor: given {address!r}; allowed: dask://HOST:PORT"
+    assert refused(address) == f"executor: given {address!r}; allowed: dask://HOST:PORT, dask+tls://HOST:PORT"
 
 
 def test_without_dask_the_message_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
