@@ -80,7 +80,7 @@ def _stage(entry: Entry) -> str:
     else:
         moments = kept_stills(entry.design, entry.folder)
     pictures = "".join(
-        f'<img alt="{name} at {time:.3g} s" src="data:image/png;base64,{b64encode(data).decode("ascii")}"'
+        f'<img alt="{name} at {time:.3g} s" src="data:image/webp;base64,{b64encode(data).decode("ascii")}"'
         f"{' class=shown' if k == len(moments) // 2 else ''}>"
         for k, (time, data) in enumerate(moments)
     )

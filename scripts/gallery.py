@@ -3,7 +3,8 @@
     python scripts/gallery.py problems --seeds 0 1 2 --limit 30
 
 Results stay in ``--out``; a task and seed that has one there is not solved again, so this can be interrupted at any
-time. ``gallery.html`` and ``table.md`` are written there after every solve.
+time. ``gallery.html`` and ``table.md`` are written there after every solve. Pictures are of each result's own
+page, by Chromium without a screen; ``--picture FILE`` writes one of the gallery's page, too.
 """
 
 from __future__ import annotations
@@ -11,12 +12,15 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from browser import MISSING, browser, screenshot
 from cards import page
 from entries import REPLAYS, Entry, entry_of, figures_of
 from shared import NOTHING, kept_solve, options_of, table_text
 from tables import add_json, write_record
 
 PAGE = "gallery.html"
+PICTURE = (1110, 1538)
+"""Width and height of the page's picture, pixels."""
 HEAD = (
     "task",
     "figure",
@@ -42,8 +46,11 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes of each solve")
     parser.add_argument("--limit", type=float, metavar="MINUTES", help="end a solve that takes longer")
     parser.add_argument("--no-solve", action="store_true", help="only show what has been solved")
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="write a PNG of the page's top")
     add_json(parser)
     given = parser.parse_args()
+    if browser() is None:  # told before solves that take hours
+        parser.error(MISSING)
     # In the thesis's order, then what is not from it.
     files = sorted(given.problems.glob("*.yaml"), key=lambda file: (figures_of(file) or ("~",), file.stem))
     if not files:
@@ -59,6 +66,8 @@ def main() -> None:
         entries[file, seed] = entry_of(file, seed, given.out, given.jobs)
         write_all(list(entries.values()), given.out)
     write_record(given.json, "gallery", HEAD, rows_of(by_task(list(entries.values()))))
+    if given.picture:
+        screenshot((given.out / PAGE).resolve().as_uri(), given.picture, PICTURE)
     print(given.out / PAGE)
 
 

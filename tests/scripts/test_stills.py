@@ -1,37 +1,51 @@
-"""The pictures' bodies, beside those of the URDF file as the audit reads it."""
+"""The pictures of a motion, beside where a camera must see it."""
 
 from __future__ import annotations
 
+import io
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from stills import _bodies
+from browser import browser
+from PIL import Image
+from stills import SIZE, stills
 
+from casadi_hands.errors import HandsError
 from casadi_hands.export.design import Design
-from casadi_hands.export.page.robot import Robot
-from casadi_hands.export.page.timeline import design_timeline
-from casadi_hands.export.urdf import hand_urdf
-from casadi_hands.verify.reading.robot import read_robot
+from casadi_hands.export.page.scene import eye_towards
 from tests.export.example import example_hand, example_motion, example_task
 
+pytestmark = pytest.mark.skipif(browser() is None, reason="no browser that runs without a screen")
 
-@pytest.mark.parametrize("hinge", [0.0, 0.02])
-def test_links_and_the_palm_s_balls_are_drawn_where_they_collide(hinge: float, tmp_path: Path) -> None:
-    hand = example_hand()
-    fingers = [replace(f, links=tuple(replace(link, hinge=hinge) for link in f.links)) for f in hand.fingers]
-    hand = replace(hand, fingers=tuple(fingers))
-    design = Design(example_task(), "certified", hand=hand, motion=example_motion())
-    (tmp_path / "hand.urdf").write_text(hand_urdf(hand))
-    timeline = design_timeline(design, Robot(hand_urdf(hand)))
-    drawn = [body for body in _bodies(design, timeline, 2) if hasattr(body, "radius") and hasattr(body, "start")]
-    for name, link in read_robot(tmp_path / "hand.urdf").links.items():
-        pose = timeline.palm[2] if name == "palm" else timeline.palm[2] @ timeline.links[name][2]
-        assert len(link.capsules) == (len(fingers) * (hinge > 0) if name == "palm" else 1)
-        for capsule in link.capsules:
-            ends = [pose[:3, :3] @ end + pose[:3, 3] for end in (capsule.start, capsule.end)]
-            assert any(
-                body.radius == pytest.approx(capsule.radius) and np.allclose([body.start, body.end], ends, atol=1e-9)
-                for body in drawn
-            ), name
+
+def yellow_middle(picture: bytes) -> np.ndarray:
+    """Mean place (right, up) of the object's dark patches, pixels."""
+    pixels = np.asarray(Image.open(io.BytesIO(picture)).convert("RGB"), float)
+    rows, columns = np.nonzero((pixels[..., 0] > pixels[..., 1]) & (pixels[..., 1] > pixels[..., 2] + 50))
+    assert len(rows) > 500
+    return np.array([columns.mean(), -rows.mean()])
+
+
+def test_the_object_moves_as_the_camera_must_see_it() -> None:
+    motion = example_motion()
+    upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(motion.time), 1))
+    motion = replace(motion, object_orientation=upright)
+    design = Design(example_task(), "certified", hand=example_hand(), motion=motion)
+    pictures = stills(design, [0.0, 0.5, 1.0])
+    assert {Image.open(io.BytesIO(picture)).size for picture in pictures} == {SIZE}
+    start, half, there = (yellow_middle(picture) for picture in pictures)
+    eye = eye_towards(np.array([1.0, 0.0, 0.0]))
+    right = np.cross([0.0, 0.0, 1.0], eye)
+    right /= np.linalg.norm(right)
+    seen = np.array([right[0], np.cross(eye, right)[0]])  # of the way along the world's x, in the picture's plane
+    moved = there - start
+    assert moved @ seen > 0.97 * np.linalg.norm(moved) * np.linalg.norm(seen)
+    assert (half - start) @ seen == pytest.approx(moved @ seen / 2, rel=0.1)
+    assert np.linalg.norm(moved) > 10
+
+
+def test_a_browser_that_draws_nothing_is_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("stills.content", lambda page: "<html></html>")
+    with pytest.raises(HandsError, match="WebGL"):
+        stills(Design(example_task(), "failed"), [0.0])
