@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import runpy
 import shlex
@@ -172,13 +173,11 @@ def test_parts_of_tasks_make_one_with_the_readmes(page: Path) -> None:
 # Python.
 
 
-def run(code: str, name: str, folder: Path) -> str:
+def run(code: str, name: str, folder: Path, result: str = "results/mine") -> str:
     """What a script prints that is run in a folder, in a process of its own, as the documents' readers run it."""
     file = folder / name
     file.write_text(code, encoding="utf-8")
-    done = subprocess.run(
-        [sys.executable, file.name, "results/mine"], cwd=folder, capture_output=True, text=True, check=False
-    )
+    done = subprocess.run([sys.executable, file.name, result], cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -230,6 +229,27 @@ def test_the_pages_show_every_name_of_the_package() -> None:
         for name in names.split(",")
     }
     assert shown == set(casadi_hands.__all__)
+
+
+@pytest.mark.slow
+def test_the_tutorial_leads_to_a_certified_hand_and_a_printed_trajectory(tmp_path: Path) -> None:
+    page = ROOT / "docs/tutorial.md"
+    (task,) = blocks(page, "yaml")
+    (tmp_path / "pencil.yaml").write_text(task, encoding="utf-8")
+    for words in commands(page)[:2]:
+        command = [sys.executable, "-c", "from casadi_hands.cli import main; main()", *words[1:]]
+        assert subprocess.run(command, cwd=tmp_path, check=False).returncode == 0, words
+    design = Design.load(tmp_path / "results/pencil")
+    assert design.status == "certified"
+    dimensions, trajectory = (
+        run(code, f"{k}.py", tmp_path, "results/pencil") for k, code in enumerate(blocks(page, "python"))
+    )
+    assert [line.split(":")[0] for line in dimensions.splitlines() if ":" in line] == ["thumb", "index", "middle"]
+    table = [line.split("\t") for line in trajectory.splitlines()]
+    assert table[0][1:] == list(design.motion.joint_names)
+    assert len(table) == 1 + len(design.motion.time)
+    assert float(table[-1][0]) == 5.0
+    assert float(table[1][1]) == pytest.approx(math.degrees(design.motion.joint_commands[0, 0]), abs=0.006)
 
 
 # References.
