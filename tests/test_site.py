@@ -90,8 +90,11 @@ def test_the_api_has_every_public_name_with_its_docstring(site: Path) -> None:
     found = Found(site / "api.html")
     text = " ".join(" ".join(found.words).split())
     for name in casadi_hands.__all__:
-        assert f"casadi_hands.{name}" in found.anchors, name
-        docstring = getattr(casadi_hands, name).__doc__
+        assert f" casadi_hands.{name} " in text, name
+        thing = getattr(casadi_hands, name)
+        assert {f"casadi_hands.{name}", f"{thing.__module__}.{thing.__qualname__}"} & found.anchors, name
+        assert f"casadi_hands.{name}.{name}" not in found.anchors  # the module of that name
+        docstring = thing.__doc__
         assert docstring.partition("\n")[0].split("`")[0].strip().rstrip(".") in text, name
 
 
