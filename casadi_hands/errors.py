@@ -4,6 +4,9 @@ from __future__ import annotations
 
 LONGEST_MESSAGE = 1900
 """Characters; what is longer than a screen nobody reads."""
+MADE_ANEW = "give a folder as `casadi-hands solve TASK` wrote it; solve the task again where this one was changed"
+ELSEWHERE = "give another folder, which you may write to"
+"""What to do about a folder that cannot be read, and one that cannot be written."""
 
 
 class HandsError(Exception):
@@ -27,7 +30,16 @@ class TaskError(HandsError):
 
 
 class DesignError(HandsError):
-    """A result folder is missing, incomplete or of another format."""
+    """A result folder is missing, incomplete or of another format.
+
+    What to do stands in a note behind the message, as tracebacks and the command line show it.
+    """
+
+    def __init__(self, message: object = "", step: str = MADE_ANEW) -> None:
+        """Message, and what to do; an empty step where the message says that itself."""
+        super().__init__(message)
+        if step:
+            self.add_note(step)
 
 
 class SolveError(HandsError):

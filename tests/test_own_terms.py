@@ -199,9 +199,12 @@ LOW = Cost("low", lowered, "floating")
     ("terms", "words"),
     [
         ([replace(LOW, stage="synthesis")], "'low' is for the stage 'synthesis'; allowed: floating, whole_hand, re"),
-        ([replace(LOW, name="goal")], "'goal' is a built-in term's name, as are .*angular_momentum, .*task"),
+        (
+            [replace(LOW, name="goal")],
+            "'goal' is a built-in term's name, as are .*angular_momentum, .*task.*; give it another",
+        ),
         ([replace(LOW, name="linear_momentum_perturbed")], "is a built-in term's name"),
-        ([replace(LOW, name="too low")], "the name 'too low' is not letters, digits and underscores"),
+        ([replace(LOW, name="too low")], "the name 'too low' is refused; allowed: letters, digits and underscores"),
         ([LOW, Bound("low", lowered, "floating")], "the stage floating is given 'low' twice"),
         ([replace(LOW, weight=-1.0)], "'low' has the weight -1.0; allowed: a number, 0 or more"),
         ([replace(LOW, form="cube")], "'low' has the form 'cube'; allowed: square, sum"),

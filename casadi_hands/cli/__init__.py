@@ -24,5 +24,5 @@ def main() -> None:
     try:
         app()
     except HandsError as error:
-        print(f"casadi-hands: {error}", file=sys.stderr)
+        print("\n".join([f"casadi-hands: {error}", *getattr(error, "__notes__", ())]), file=sys.stderr)
         sys.exit(2)

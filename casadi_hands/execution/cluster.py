@@ -48,7 +48,10 @@ def cluster(address: str) -> Iterator[Executor]:
         # The same call twice is two calls, not one whose result is looked up.
         yield client.get_executor(pure=False)
     except (KilledWorker, CancelledError) as error:
-        raise SolveError(f"{address} has lost a trial: a worker died with it, or the scheduler is gone") from error
+        raise SolveError(
+            f"{address} has lost a trial: a worker died with it, or the scheduler is gone; give "
+            "workers more memory, or leave --executor out"
+        ) from error
     finally:
         client.close()
 
@@ -70,12 +73,12 @@ def _connected(address: str, plain: str) -> Client:
         raise SolveError(f"{address}: {error}; see docs/how-to/cluster.md for the settings of TLS") from error
     except (OSError, ValueError, MemoryError) as error:
         # MemoryError, because what another kind of server says is read as the length of a message.
-        raise SolveError(f"{address}: no dask scheduler answers there") from error
+        raise SolveError(f"{address}: no dask scheduler answers there; start one with: dask scheduler") from error
     try:
         client.wait_for_workers(1, timeout=PATIENCE)
     except TimeoutError as error:
         client.close()
-        raise SolveError(f"{address}: this cluster has no workers") from error
+        raise SolveError(f"{address}: this cluster has no workers; {_how_to_start(address)}") from error
     return client
 
 
@@ -93,7 +96,7 @@ def _check_workers(address: str, client: Client) -> None:
     Raises:
         SolveError: there is one; the message says how to start it.
     """
-    start = f"start workers with: OMP_NUM_THREADS=1 dask worker {address[7:]} --nthreads 1 --nworkers N"
+    start = _how_to_start(address)
     for worker, threads in client.nthreads().items():
         if threads != 1:
             raise SolveError(
@@ -104,13 +107,22 @@ def _check_workers(address: str, client: Client) -> None:
     here = surroundings()["versions"]
     for worker, answer in answers.items():
         if isinstance(answer, BaseException):
-            raise SolveError(f"{address}: worker {worker} cannot run casadi-hands: {answer}") from answer
+            raise SolveError(
+                f"{address}: worker {worker} cannot run casadi-hands: {answer}; install it there"
+            ) from answer
         if answer["versions"] != here:
             there = answer["versions"]
             differing = [f"{name} {there[name]} (here {here[name]})" for name in here if there[name] != here[name]]
-            raise SolveError(f"{address}: worker {worker} has other versions: {', '.join(differing)}")
+            raise SolveError(
+                f"{address}: worker {worker} has other versions: {', '.join(differing)}; install the same there"
+            )
         if answer["threads"] != "1":
             raise SolveError(f"{address}: worker {worker} may use several threads of linear algebra; {start}")
+
+
+def _how_to_start(address: str) -> str:
+    scheduler = address.partition("://")[2]
+    return f"start workers with: OMP_NUM_THREADS=1 dask worker {scheduler} --nthreads 1 --nworkers N"
 
 
 def surroundings() -> dict[str, Any]:

@@ -119,7 +119,7 @@ def read_record(directory: Path) -> dict[str, Any]:
             kind; the message names the first of these.
     """
     if not directory.is_dir():
-        raise DesignError(f"{directory}: there is no such folder; give one that `casadi-hands solve` wrote")
+        raise DesignError(f"{directory}: there is no such folder; give one that `casadi-hands solve` wrote", "")
     path = directory / "result.json"
     if not path.is_file():
         raise DesignError(f"{directory}: no result.json, so this is not the folder of a finished design")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from casadi_hands.errors import DesignError, TaskError
+from casadi_hands.errors import ELSEWHERE, DesignError, TaskError
 from casadi_hands.export.arrays import load_motion, save_motion
 from casadi_hands.export.checked import read_record
 from casadi_hands.export.commands import commanded
@@ -40,7 +40,9 @@ def save_design(design: Result, directory: Path, page: bool = True) -> None:
     try:
         replace_folder(directory, lambda made: write_files(design, made, page))
     except OSError as error:
-        raise DesignError(f"{shown(directory)}: cannot write the design here: {error.strerror or error}") from error
+        raise DesignError(
+            f"{shown(directory)}: cannot write the design here: {error.strerror or error}", ELSEWHERE
+        ) from error
 
 
 def write_files(design: Result, directory: Path, page: bool = True) -> None:
@@ -56,7 +58,7 @@ def write_files(design: Result, directory: Path, page: bool = True) -> None:
         OSError: the files cannot be written.
     """
     if design.status not in STATUSES:
-        raise DesignError(f"a design's status is one of {', '.join(STATUSES)}, not {design.status!r}")
+        raise DesignError(f"a design's status is one of {', '.join(STATUSES)}, not {design.status!r}", "")
     motion = design.motion
     texts = {"task.yaml": task_to_yaml(design.task), "object.urdf": object_urdf(design.task)}
     if design.hand is not None:
@@ -96,7 +98,7 @@ def remove_design(directory: Path) -> None:
         if directory.is_dir() and not any(directory.iterdir()):
             directory.rmdir()
     except OSError as error:
-        raise DesignError(f"{directory}: cannot remove the design here: {error}") from error
+        raise DesignError(f"{directory}: cannot remove the design here: {error}", ELSEWHERE) from error
 
 
 def read_design(directory: Path) -> dict[str, Any]:

@@ -43,7 +43,7 @@ def number(value: float) -> str:
         DesignError: the value is infinite or not a number, which neither URDF nor MJCF can hold.
     """
     if not isfinite(value):
-        raise DesignError(f"a design cannot be written with the value {value} in it; every number must be finite")
+        raise DesignError(f"a design cannot be written with the value {value} in it; every number must be finite", "")
     return repr(float(value) + 0.0)
 
 

@@ -74,6 +74,9 @@ def _serialised(joints: int) -> str:
     try:
         extension = import_module("casadi_hands.kinematics._extension")
     except ImportError as error:
-        raise KinematicsError(f"the compiled kinematics extension does not load: {error}") from error
+        raise KinematicsError(
+            f"the compiled kinematics extension does not load: {error}; build it anew with pip install . in the source "
+            "folder of casadi-hands"
+        ) from error
     serialised: str = extension.finger_kinematics(joints)
     return serialised

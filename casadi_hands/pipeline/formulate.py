@@ -86,7 +86,7 @@ class Formulation:
         try:
             save_program(self.program, folder, title, self._facts(), known)
         except OSError as error:
-            raise SolveError(f"{folder}: cannot write the program here: {error}") from error
+            raise SolveError(f"{folder}: cannot write the program here: {error}; give another --out") from error
         return folder / "index.html"
 
     def _facts(self) -> dict[str, Any]:
@@ -159,7 +159,9 @@ def formulate(
             model, step, solve = _posed(record, stage, workers)
         except SolverError as error:
             _LOG.debug("the stages broke off", exc_info=True)
-            raise SolveError(f"a solver broke off before the stage {stage} posed its program: {error}") from error
+            raise SolveError(
+                f"a solver broke off before the stage {stage} posed its program: {error}; try another seed"
+            ) from error
     return Formulation(task.name, stage, task.search.seed, step, model, solve)
 
 

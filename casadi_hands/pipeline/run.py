@@ -93,9 +93,11 @@ def solve(
     if until not in STAGES:
         raise SolveError(f"until: given {until!r}; allowed: {', '.join(STAGES)}")
     if start is not None and until != STAGES[-1]:
-        raise SolveError(f"from an earlier result only the stage {STAGES[-1]} is run; it cannot stop after {until}")
+        raise SolveError(f"until: given {until!r}; allowed with an earlier result: {STAGES[-1]}, all that is run")
     if resume and (out is None or terms):
-        raise SolveError("only a solve that writes a folder (out), without terms of its own, can be resumed")
+        raise SolveError(
+            "only a solve that writes a folder (out), without terms of its own, can be resumed; leave resume out"
+        )
     if seed is not None:
         task = task.model_copy(update={"search": task.search.model_copy(update={"seed": seed})})
     own_terms = checked(terms)

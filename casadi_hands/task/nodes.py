@@ -21,6 +21,7 @@ MOST_LEVELS = 20
 """Of lists and mappings within each other; a task has seven."""
 _VERSION = re.compile(r"^%YAML[ \t]+(?!1\.2\b)(\S+)", re.MULTILINE)
 _LONGEST = 300  # characters of what the parser says
+_AS_YAML = "; mend that line or the one before"
 
 
 class TooMuchError(Exception):
@@ -92,11 +93,13 @@ def compose(text: str, source: str) -> Node | None:
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = f"{source}:{mark.line + 1}" if mark else source
-        raise TaskError(f"{where}: not YAML: {escaped(str(error.problem or error.context), _LONGEST)}") from None
+        raise TaskError(
+            f"{where}: not YAML: {escaped(str(error.problem or error.context), _LONGEST)}{_AS_YAML}"
+        ) from None
     except YAMLError as error:
-        raise TaskError(f"{source}: not YAML: {escaped(str(error).splitlines()[0], _LONGEST)}") from None
+        raise TaskError(f"{source}: not YAML: {escaped(str(error).splitlines()[0], _LONGEST)}{_AS_YAML}") from None
     except ValueError as error:  # a number after a backslash that is no character's
-        raise TaskError(f"{source}: not YAML: {escaped(str(error), _LONGEST)}") from None
+        raise TaskError(f"{source}: not YAML: {escaped(str(error), _LONGEST)}{_AS_YAML}") from None
 
 
 @lru_cache(maxsize=4)

@@ -13,6 +13,7 @@ from casadi_hands.task.shown import escaped
 LARGEST = 1_000_000
 """Bytes of a task file; those in problems/ have a thousandth of it."""
 _LONGEST_NAME = 250
+_ANOTHER = "give the path of a task file that you may read"
 _KINDS = {
     stat.S_IFIFO: "a pipe",
     stat.S_IFCHR: "a device",
@@ -66,7 +67,7 @@ def _bytes(path: Path, name: str) -> bytes:
     except FileNotFoundError:
         raise TaskError(f"{name}: no such file; give the path of a task file") from None
     except (OSError, ValueError) as error:  # ValueError: a path with a NUL
-        raise TaskError(f"{name}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
+        raise TaskError(f"{name}: cannot be read: {getattr(error, 'strerror', None) or error}; {_ANOTHER}") from None
     try:
         mode = os.fstat(descriptor).st_mode
         if stat.S_ISDIR(mode):
@@ -77,6 +78,6 @@ def _bytes(path: Path, name: str) -> bytes:
         with os.fdopen(descriptor, "rb", closefd=False) as file:
             return file.read(LARGEST + 1)
     except OSError as error:
-        raise TaskError(f"{name}: cannot be read: {error.strerror}") from None
+        raise TaskError(f"{name}: cannot be read: {error.strerror}; {_ANOTHER}") from None
     finally:
         os.close(descriptor)

@@ -114,14 +114,16 @@ def checked(terms: Sequence[OwnTerm]) -> tuple[OwnTerm, ...]:
 
 def _check_name(term: OwnTerm, taken: set[tuple[str, str]]) -> None:
     if not isinstance(term.name, str) or not term.name.isidentifier():
-        raise SolveError(f"terms: the name {term.name!r} is not letters, digits and underscores")
+        raise SolveError(f"terms: the name {term.name!r} is refused; allowed: letters, digits and underscores")
     if term.stage not in OWN_STAGES:
         raise SolveError(f"terms: '{term.name}' is for the stage {term.stage!r}; allowed: {', '.join(OWN_STAGES)}")
     # Those of a second scenario are reported by the term's name with this ending.
     if term.name.removesuffix("_perturbed") in names():
-        raise SolveError(f"terms: '{term.name}' is a built-in term's name, as are {', '.join(names())}")
+        raise SolveError(
+            f"terms: '{term.name}' is a built-in term's name, as are {', '.join(names())}; give it another"
+        )
     if (term.stage, term.name) in taken:
-        raise SolveError(f"terms: the stage {term.stage} is given '{term.name}' twice; every term has its own name")
+        raise SolveError(f"terms: the stage {term.stage} is given '{term.name}' twice; give every term its own name")
 
 
 def _check_cost(term: Cost) -> None:

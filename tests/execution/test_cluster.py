@@ -151,7 +151,7 @@ def test_where_nobody_answers_the_wait_ends(listens: bool, monkeypatch: pytest.M
         asking = threading.Thread(target=lambda: told.append(refused(address)), daemon=True)
         asking.start()
         asking.join(60)
-        assert told == [f"{address}: no dask scheduler answers there"]
+        assert told == [f"{address}: no dask scheduler answers there; start one with: dask scheduler"]
 
 
 def test_what_is_no_scheduler_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -165,13 +165,15 @@ def test_what_is_no_scheduler_does_not_answer(monkeypatch: pytest.MonkeyPatch) -
 
         threading.Thread(target=chat, daemon=True).start()
         address = f"dask://127.0.0.1:{server.getsockname()[1]}"
-        assert refused(address) == f"{address}: no dask scheduler answers there"
+        assert refused(address).startswith(f"{address}: no dask scheduler answers there; ")
 
 
 def test_a_cluster_without_workers_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "PATIENCE", 1.0)
     with LocalCluster(n_workers=0, dashboard_address=":0", processes=True) as empty:
-        assert refused(address_of(empty)) == f"{address_of(empty)}: this cluster has no workers"
+        assert refused(address_of(empty)).startswith(
+            f"{address_of(empty)}: this cluster has no workers; start workers "
+        )
 
 
 def test_a_worker_of_two_threads_is_refused_with_how_to_start_it() -> None:

@@ -147,7 +147,9 @@ def test_what_cannot_be_started_from_is_refused_before_anything_is_written(folde
     ):
         with pytest.raises(error, match=words):
             solve(task, jobs=1, out=tmp_path / "out", start=start)
-    with pytest.raises(SolveError, match="only the stage refine is run; it cannot stop after floating"):
+    with pytest.raises(
+        SolveError, match="until: given 'floating'; allowed with an earlier result: refine, all that is run"
+    ):
         solve(parse_task(HELD), until="floating", start=folder)
     assert not (tmp_path / "out").exists()
     assert Design.load(folder).status == "certified"

@@ -158,7 +158,11 @@ REFUSED = {
     ),
     "an unknown field with an escape": ("object:", '"\\e[2J": 1\nobject:', "task: given '\\x1b[2J'; allowed: ..."),
     "an old YAML": ("object:", "%YAML 1.1\n---\nobject:", "given YAML 1.1; a task file is YAML 1.2"),
-    "no character": ("object:", '"\\U00110000": 1\nobject:', "...not YAML: chr() arg not in range(0x110000)"),
+    "no character": (
+        "object:",
+        '"\\U00110000": 1\nobject:',
+        "...not YAML: chr() arg not in range(0x110000); mend that line or the one before",
+    ),
     "contacts that the surface brings together": (
         "[-0.03, 0, 0]",
         "[0.0305, 0.00001, 0]",

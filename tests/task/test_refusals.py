@@ -668,15 +668,15 @@ NOT_A_TASK = {
     ),
     "an open bracket": (
         "name: x\npalm: {radius: [1\nmotion: 3\n",
-        "wrong.yaml:...: not YAML: ...",
+        "wrong.yaml:...: not YAML: ...; mend that line or the one before",
     ),
     "a tab": (
         "object:\n\tmass: 1\n",
-        "wrong.yaml:2: not YAML: found character '\\t' that cannot start any token",
+        "wrong.yaml:2: not YAML: found character '\\t' that cannot start any token; mend that line or the one before",
     ),
     "an undefined anchor": (
         "name: *x\n",
-        "wrong.yaml:1: not YAML: found undefined alias 'x'",
+        "wrong.yaml:1: not YAML: found undefined alias 'x'; mend that line or the one before",
     ),
     "an anchor in itself": (
         "name: &x [*x]\n",
@@ -688,7 +688,7 @@ NOT_A_TASK = {
     ),
     "two documents": (
         "name: x\n---\nname: y\n",
-        "wrong.yaml:2: not YAML: but found another document",
+        "wrong.yaml:2: not YAML: but found another document; mend that line or the one before",
     ),
     "a field given twice": (
         "name: x\nobject: {mass: 1, mass: 2}\n",

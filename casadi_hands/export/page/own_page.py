@@ -47,7 +47,7 @@ def open_page(directory: Path) -> Path:
             _own((directory / entry.address).parent)
     page = directory / PAGE
     if not webbrowser.open(page.resolve().as_uri()):
-        raise DesignError(f"no browser found; open {page.resolve()} in one yourself")
+        raise DesignError(f"no browser found; open {page.resolve()} in one yourself", "")
     return page
 
 
@@ -88,5 +88,6 @@ def _replace(page: Path, text: bytes) -> None:
             raise
     except OSError as error:
         raise DesignError(
-            f"{page}: not the page that the folder's files give, so it is not opened; it cannot be replaced: {error}"
+            f"{page}: not the page that the folder's files give, so it is not opened; it cannot be replaced: {error}",
+            "copy the folder to where you may write, and view it there",
         ) from None

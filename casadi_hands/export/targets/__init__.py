@@ -35,7 +35,7 @@ def export_design(directory: str | Path, target: str, out: str | Path | None = N
         HandsError: there is no such target, what it needs is not installed, or its place holds something else.
     """
     if target not in TARGETS:
-        raise HandsError(f"there is no export to {target!r}; there are {', '.join(TARGETS)}")
+        raise HandsError(f"there is no export to {target!r}; give one of {', '.join(TARGETS)}")
     kind = TARGETS[target]
     place = Path(out) if out is not None else Path(directory) / "export" / kind.default
     return kind.write(Source.read(Path(directory)), place)

@@ -47,7 +47,7 @@ def _write(path: Path, text: str) -> Path:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise HandsError(f"{path}: cannot write the export here: {error}") from error
+        raise HandsError(f"{path}: cannot write the export here: {error}; give another --out") from error
     return path
 
 

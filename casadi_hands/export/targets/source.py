@@ -48,12 +48,16 @@ class Source:
         """
         design = Design.load(directory)
         if design.hand is None or design.motion is None:
-            raise DesignError(f"{directory}: the design has no hand that moves yet, so there is nothing to export")
+            raise DesignError(
+                f"{directory}: the design has no hand that moves yet, so there is nothing to export",
+                "solve its task again, to the last stage",
+            )
         for name in _COMMANDS:
             if getattr(design.motion, name) is None:
                 raise DesignError(
                     f"{directory}: motion.npz has no {name}; it was made by an earlier version; "
-                    f"`casadi-hands solve {directory / 'task.yaml'} --from {directory}` makes it anew"
+                    f"`casadi-hands solve {directory / 'task.yaml'} --from {directory}` makes it anew",
+                    "",
                 )
         commands, velocities = design.motion.joint_commands, design.motion.joint_velocities
         if design.hand.drive is not None:
@@ -91,7 +95,7 @@ def write_texts(folder: Path, texts: dict[str, str], mark: str) -> None:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise HandsError(f"{folder}: cannot write the export here: {error}") from error
+        raise HandsError(f"{folder}: cannot write the export here: {error}; give another --out") from error
 
 
 def _is_ours(path: Path) -> bool:

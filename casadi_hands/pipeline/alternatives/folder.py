@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from casadi_hands.errors import DesignError
+from casadi_hands.errors import ELSEWHERE, DesignError
 from casadi_hands.export.folder import remove_design
 from casadi_hands.export.moving import replace_file
 from casadi_hands.export.page.page import MenuEntry, write_page
@@ -58,7 +58,7 @@ def write_ranking(ranked: Sequence[Alternative], directory: Path, keeper: Keeper
             seeds = read_alternatives(directory)
             replace_file(directory / REPORT, lambda path: write_report(ranked[0].design, path, seeds))
     except OSError as error:
-        raise DesignError(f"{directory}: cannot write the alternatives here: {error}") from error
+        raise DesignError(f"{directory}: cannot write the alternatives here: {error}", ELSEWHERE) from error
 
 
 def remove_surplus(ranked: Sequence[Alternative], directory: Path) -> None:
@@ -87,7 +87,7 @@ def remove_alternatives(directory: Path) -> None:
         if not any(folder.iterdir()):
             folder.rmdir()
     except OSError as error:
-        raise DesignError(f"{folder}: cannot remove the alternatives here: {error}") from error
+        raise DesignError(f"{folder}: cannot remove the alternatives here: {error}", ELSEWHERE) from error
 
 
 def _entry(one: Alternative) -> dict[str, Any]:

@@ -94,7 +94,10 @@ class Search:
         # A contact that never acts has no finger.
         self.contacts = tuple(c for c in range(len(self.names)) if target.active[:, c].any())
         if not self.contacts:
-            raise SolveError("no finger contact is ever active: the task needs no hand, or none could help")
+            raise SolveError(
+                "no finger contact is ever active: the task needs no hand, or none could help; give goals where the "
+                "object would not rest by itself"
+            )
         self.pools: dict[int, list[tuple[float, FingerSeed]]] = {c: [] for c in self.contacts}
         self.grown: dict[int, int] = {}  # joints of the fingers in each pool
         self.runs: list[dict[str, Any]] = []

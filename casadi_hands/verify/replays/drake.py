@@ -79,7 +79,7 @@ class DrakeSimulation:
             HandsError: Drake is not installed or cannot be loaded, or cannot be told of the perturbation.
         """
         if perturbation.torsion != 1.0:
-            raise HandsError("Drake's contacts are patches, whose torsional friction is their own: no factor of it")
+            raise HandsError("Drake's contacts are patches, with their own torsional friction: leave its factor at 1")
         self._drake = drake = load_drake()
         self._names, self._drive = folder.motion.joint_names, folder.drive
         motors, self._moves = read_motors(folder, perturbation)
@@ -276,7 +276,7 @@ class DrakeSimulation:
             self._simulator.AdvanceTo(self._steps * self.step)
         except RuntimeError as error:
             raise HandsError(
-                f"Drake gave up {self._steps * self.step:.3f} s into the replay: {one_line(error)}"
+                f"Drake gave up {self._steps * self.step:.3f} s into the replay: {one_line(error)}; try --engine mujoco"
             ) from None
         if observer is not None:
             observer(self._plant, self._context)

@@ -48,13 +48,13 @@ def load_drake() -> Any:
         return import_module("pydrake")
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] != "pydrake":
-            raise HandsError(f"Drake cannot be loaded ({one_line(error)})") from None
+            raise HandsError(f"Drake cannot be loaded ({one_line(error)}); try --engine mujoco") from None
         system, machine = platform.system(), platform.machine()
         wheels = {("Linux", "x86_64"), ("Darwin", "arm64")}
         missing = f"; there is no wheel of it for {system} on {machine}" if (system, machine) not in wheels else ""
         raise HandsError(f"replay with Drake needs it: pip install 'casadi-hands[drake]'{missing}") from None
     except Exception as error:
-        raise HandsError(f"Drake cannot be loaded ({one_line(error)})") from None
+        raise HandsError(f"Drake cannot be loaded ({one_line(error)}); try --engine mujoco") from None
 
 
 @dataclass(frozen=True)

@@ -56,7 +56,8 @@ class Plan:
         if motion.joint_commands is None:
             raise DesignError(
                 f"{folder.path / 'motion.npz'}: no joint_commands, since an earlier version wrote it; "
-                f"`casadi-hands solve {folder.path / 'task.yaml'} --from {folder.path}` makes it anew"
+                f"`casadi-hands solve {folder.path / 'task.yaml'} --from {folder.path}` makes it anew",
+                "",
             )
         path = build_trajectory(folder, object_shots(folder))
         steps = np.arange(round((motion.time[-1] - motion.time[0]) / step) + 1)

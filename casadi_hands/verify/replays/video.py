@@ -39,7 +39,9 @@ def film(directory: str | Path, file: str | Path, perturbation: Perturbation | N
         imageio.mimsave(file, camera.frames, fps=FRAMES)
     # imageio passes on what its plugins raise: a LookupError for a still picture's format, say.
     except (OSError, ValueError, LookupError) as error:
-        raise HandsError(f"{file}: cannot be written as a video: {one_line(error)}") from None
+        raise HandsError(
+            f"{file}: cannot be written as a video: {one_line(error)}; try a .mp4 or .gif in another folder"
+        ) from None
     return outcome
 
 
