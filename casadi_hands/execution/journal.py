@@ -100,7 +100,9 @@ class Section:
         except OSError as error:
             with suppress(OSError):
                 part.unlink()
-            raise SolveError(f"{path.parent}: cannot write what is finished here: {error.strerror or error}") from error
+            raise SolveError(
+                f"{path.parent}: cannot write what is finished here: {error.strerror or error}; give another folder"
+            ) from error
         kept: tuple[str, Result] = unpack(data)
         return kept[1]
 

@@ -143,7 +143,7 @@ class _Worker:
                 self._process: BaseProcess = context.Process(target=_work, args=(theirs,), daemon=True)
                 self._process.start()
             except OSError as error:
-                raise SolveError(f"no process can be started for the trials: {error}") from error
+                raise SolveError(f"no process can be started for the trials: {error}; give --jobs 1") from error
             theirs.close()
 
     def run(self, function: Callable[..., Any], arguments: tuple[Any, ...], longest: float) -> str | None:

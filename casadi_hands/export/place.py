@@ -17,7 +17,7 @@ from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
 
-from casadi_hands.errors import DesignError
+from casadi_hands.errors import ELSEWHERE, DesignError
 from casadi_hands.export.moving import clear_away, exchange, move_files, to_disk
 
 _LOCK, _NEXT = "lock", "next-"
@@ -36,11 +36,11 @@ def resolved(directory: Path) -> Path:
     try:
         found = directory.resolve()
         if os.path.lexists(found) and not found.is_dir():
-            raise DesignError(f"{shown(directory)}: cannot write the design here: it is a file")
+            raise DesignError(f"{shown(directory)}: cannot write the design here: it is a file", ELSEWHERE)
         with suppress(FileNotFoundError):
             found.stat()
     except (OSError, RuntimeError, ValueError) as error:
-        raise DesignError(f"{shown(directory)}: cannot write the design here: {_why(error)}") from error
+        raise DesignError(f"{shown(directory)}: cannot write the design here: {_why(error)}", ELSEWHERE) from error
     return found
 
 
@@ -78,7 +78,7 @@ def owned(directory: Path) -> Iterator[Path]:
     try:
         lock = _locked(directory, place)
     except OSError as error:
-        raise DesignError(f"{shown(directory)}: cannot write the design here: {_why(error)}") from error
+        raise DesignError(f"{shown(directory)}: cannot write the design here: {_why(error)}", ELSEWHERE) from error
     _owned[directory] = place
     try:
         _clear(place, directory)
@@ -122,7 +122,8 @@ def _locked(directory: Path, place: Path) -> int:
             os.close(file)
             who = f" (process {other})" if other.isdigit() else ""
             raise DesignError(
-                f"{directory}: another solve{who} is writing here; wait for it, or give another folder (--out)"
+                f"{directory}: another solve{who} is writing here; wait for it, or give another folder (--out)",
+                "",
             ) from None
         except FileNotFoundError:
             pass

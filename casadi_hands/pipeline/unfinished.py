@@ -68,7 +68,9 @@ class Unfinished:
             replace_file(self.place / _REQUEST, lambda path: path.write_text(text, encoding="utf-8"))
         except OSError as error:
             self.end()
-            raise SolveError(f"{shown(self.place)}: cannot write here: {error.strerror or error}") from error
+            raise SolveError(
+                f"{shown(self.place)}: cannot write here: {error.strerror or error}; give another folder (--out)"
+            ) from error
         return Journal(self.place / _UNITS)
 
     def go_on(self, request: Request) -> Journal:
@@ -133,7 +135,7 @@ def stopped_solve(directory: Path) -> tuple[Task, Request]:
     request = _read(place)
     if request is None:
         done = " a finished result is there" if (directory / LAST).is_file() else " nothing was kept for it"
-        raise SolveError(f"{shown(directory)}: no solve into this folder was stopped;{done}")
+        raise SolveError(f"{shown(directory)}: no solve into this folder was stopped;{done}; leave --resume out")
     return load_task(place / _TASK, within=True), request
 
 

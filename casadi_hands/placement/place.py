@@ -103,7 +103,7 @@ def propose(task: Task) -> Proposal:
         SolveError: all contacts are placed.
     """
     if task.is_placed:
-        raise SolveError("all contacts are given; there are none to place")
+        raise SolveError("all contacts are given; there are none to place; see `touches` in casadi-hands fields")
     model = build_model(task)
     rng = np.random.default_rng((task.search.seed, _STREAM))
     drawn = spots(model.bodies, model.link_radius, CANDIDATES, rng)

@@ -65,7 +65,9 @@ class FingerSpec(Section):
             TaskError: there is only a region.
         """
         if isinstance(self.touches, Region):
-            raise TaskError(f"the contact is not placed yet: it is to be {self.touches}; `solve` places it first")
+            raise TaskError(
+                f"the contact is not placed yet: it is to be {self.touches}; `casadi-hands solve` places it first"
+            )
         x, y, z = self.touches
         return x, y, z
 

@@ -201,6 +201,6 @@ def test_options_that_do_not_go_with_going_on(arguments: list[str], words: str) 
 
 def test_where_nothing_was_stopped_the_message_says_what_is_there(tmp_path: Path) -> None:
     found = run("--resume", tmp_path / "out")
-    assert str(found.exception).endswith("no solve into this folder was stopped; nothing was kept for it")
+    assert str(found.exception).endswith("was stopped; nothing was kept for it; leave --resume out")
     example_design().save(tmp_path / "out")
     assert str(run("--resume", tmp_path / "out").exception).endswith("a finished result is there")

@@ -47,7 +47,9 @@ def write_usd(source: Source, out: Path) -> Path:
             object is attached to the world.
     """
     if source.task.object.attached is not None:
-        raise HandsError("usd: its object would be free; this one is attached to the world, as scene.xml has it")
+        raise HandsError(
+            "usd: its object would be free; this one is attached to the world: give scene.xml to a reader of MJCF"
+        )
     usd = _load()
     hand = _converted(usd, "hand", source.welded_urdf())
     _drive(usd, hand, source)

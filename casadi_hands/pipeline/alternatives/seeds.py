@@ -73,7 +73,9 @@ def explore(
     if until not in STAGES:
         raise SolveError(f"until: given {until!r}; allowed: {', '.join(STAGES)}")
     if resume and (out is None or terms):
-        raise SolveError("only an exploration that writes a folder (out), without terms of its own, can be resumed")
+        raise SolveError(
+            "only an exploration that writes a folder (out), without terms of its own, can be resumed; leave resume out"
+        )
     out = None if out is None else Path(out)
     settings = {"jobs": jobs, "until": until, "executor": executor, "terms": terms}
     explored = partial(_explored, task, seeds, settings, progress or (lambda _: None))

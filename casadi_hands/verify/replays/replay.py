@@ -149,7 +149,7 @@ def replay_each(
             lost = error
         else:
             return [played[k % jobs][k // jobs] for k in range(len(perturbations))]
-    raise HandsError(f"{directory}: processes that replay this died each of {ATTEMPTS} times") from lost
+    raise HandsError(f"{directory}: processes that replay this died each of {ATTEMPTS} times; give --jobs 1") from lost
 
 
 def _replay_all(directory: str | Path, engine: str, perturbations: Sequence[Perturbation]) -> list[Replay]:
@@ -182,7 +182,9 @@ class World(Protocol):
 
 def _drake(folder: Folder, perturbation: Perturbation) -> World:
     if folder.task.object.attached is not None:
-        raise HandsError("replay with Drake is for free objects; this one is attached to the world: use MuJoCo")
+        raise HandsError(
+            "replay with Drake is for free objects; this one is attached to the world: try --engine mujoco"
+        )
     # It takes a second to load, and most replays do without.
     from casadi_hands.verify.replays.drake import DrakeSimulation
 
