@@ -1,6 +1,7 @@
-"""A hook of mkdocs: files of the repository that pages link to, and that are not in docs/, become pages, too.
+"""Hooks of mkdocs: files of the repository that pages link to, and that are not in docs/, become pages, too.
 
-Links lead where they lead on the repository's own pages: to a file as it stands, to a folder's list of files.
+Links lead where they lead on the repository's own pages: to a file as it stands, to a folder's list of files. The
+navigation gets the recipes in the order in which their index lists them.
 """
 
 from __future__ import annotations
@@ -16,11 +17,20 @@ from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
+RECIPES = DOCS / "how-to"
 PLACE = "source"
 """Folder of these pages."""
 _LINK = re.compile(r"(\]\()([^)\s]+)(\))")
 _FENCE = re.compile(r"(^ *```.*?^ *```|`[^`\n]+`)", re.DOTALL | re.MULTILINE)
 _LANGUAGES = {".py": "python", ".yaml": "yaml", ".json": "json", ".toml": "toml"}
+
+
+def on_config(config: MkDocsConfig) -> MkDocsConfig:
+    """Put every recipe that the recipes' index lists behind it in the navigation."""
+    index = RECIPES / "README.md"
+    (recipes,) = (section["Recipes"] for section in config.nav or () if "Recipes" in section)
+    recipes += [address(page) for page in dict.fromkeys(_targets(index)) if page.parent == RECIPES and page != index]
+    return config
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:

@@ -5,16 +5,12 @@ from __future__ import annotations
 import ast
 import pickle
 import re
-import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-import typer
-from typer.testing import CliRunner
 
 from casadi_hands.cli import main
-from casadi_hands.cli.app import app
 from casadi_hands.errors import MADE_ANEW, DesignError
 from tests.documents import ROOT
 from tests.export.example import example_design
@@ -77,17 +73,6 @@ def test_an_error_of_a_folder_says_how_to_make_it_anew(
     first, last = capsys.readouterr().err.splitlines()
     assert first.startswith(f"casadi-hands: {folder / 'motion.npz'}: ")
     assert last == MADE_ANEW
-
-
-@pytest.mark.parametrize("command", sorted(typer.main.get_command(app).commands))
-def test_the_help_of_each_command_shows_an_example_that_parses(command: str) -> None:
-    told = typer.main.get_command(app).commands[command]
-    words = shlex.split((told.epilog or "").partition("Example: ")[2].partition("\n")[0])
-    assert words[:2] == ["casadi-hands", command]
-    assert all((ROOT / word).is_file() for word in words if word.startswith("problems/"))
-    told.make_context(command, words[2:])
-    shown = " ".join(CliRunner().invoke(app, [command, "--help"]).output.split())
-    assert " ".join(words) in shown
 
 
 def test_notes_go_from_process_to_process_once() -> None:
