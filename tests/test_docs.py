@@ -248,7 +248,7 @@ def test_the_tutorial_leads_to_a_certified_hand_and_a_printed_trajectory(tmp_pat
     table = [line.split("\t") for line in trajectory.splitlines()]
     assert table[0][1:] == list(design.motion.joint_names)
     assert len(table) == 1 + len(design.motion.time)
-    assert float(table[-1][0]) == 5.0
+    assert float(table[-1][0]) == 2.0
     assert float(table[1][1]) == pytest.approx(math.degrees(design.motion.joint_commands[0, 0]), abs=0.006)
 
 
