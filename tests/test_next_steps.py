@@ -21,7 +21,7 @@ STEPS = re.compile(
 )
 """Words with which a next step begins."""
 KINDS = ("HandsError", "TaskError", "SolveError", "KinematicsError")
-COMPOSED = re.compile(r"\.(what|problem)\b|\['why'\]")
+COMPOSED = re.compile(r"\.(what|problem)\b|\['why'\]|too_deep\(\)")
 """Where a message's words come from another error, which has them."""
 
 

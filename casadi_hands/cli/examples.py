@@ -84,7 +84,7 @@ def write_new(path: Path, text: str) -> None:
     except FileExistsError:
         raise HandsError(f"{path}: is there already; give another file, or move it away") from None
     except OSError as error:
-        raise HandsError(f"{path}: cannot be written: {error.strerror}") from None
+        raise HandsError(f"{path}: cannot be written: {error.strerror}; give another file") from None
 
 
 def _example(path: Path) -> Example:

@@ -192,7 +192,9 @@ class Task(Section):
             TaskError: the fields make no task; a line for each thing that is wrong. Or the task is not of `load_task`.
         """
         if self._given.make is None:
-            raise TaskError("a task can be changed that load_task gave; this one was made of sections")
+            raise TaskError(
+                "a task can be changed that load_task gave; this one was made of sections: give load_task a mapping"
+            )
         data = self._given.data
         if data is None:
             data = plain(self.model_dump(by_alias=True, exclude_none=True))
