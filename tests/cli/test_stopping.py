@@ -203,4 +203,4 @@ def test_where_nothing_was_stopped_the_message_says_what_is_there(tmp_path: Path
     found = run("--resume", tmp_path / "out")
     assert str(found.exception).endswith("was stopped; nothing was kept for it; leave --resume out")
     example_design().save(tmp_path / "out")
-    assert str(run("--resume", tmp_path / "out").exception).endswith("a finished result is there")
+    assert str(run("--resume", tmp_path / "out").exception).endswith("a finished result is there; leave --resume out")
