@@ -95,5 +95,6 @@ def _data(scene: Scene, time: float | None) -> str:
         "eye": scene.eye.tolist(),
         "span": [float(scene.time[0]), float(scene.time[-1])],
         "start": time,
+        "labels": [label.as_data() for label in scene.labels],
     }
     return json.dumps(data).replace("<", "\\u003c")

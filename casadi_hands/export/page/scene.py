@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -35,12 +36,13 @@ from casadi_hands.export.page.shapes import (
 )
 from casadi_hands.export.page.timeline import Timeline, design_timeline, goal_poses, poses
 from casadi_hands.export.page.tracks import Tracks
+from casadi_hands.export.page.unsolved import Label, bare_palm, distinct_goals, goal_labels, steps
 from casadi_hands.export.urdf import hand_urdf, object_urdf
-from casadi_hands.problem.hand import Hand
 
 if TYPE_CHECKING:
     from casadi_hands.problem.motion import Motion
     from casadi_hands.problem.result import Result
+    from casadi_hands.task import Task
 
 FORCE_COLOR: Color = (0.85, 0.12, 0.15)
 EXTERNAL_COLOR: Color = (0.45, 0.20, 0.75)
@@ -64,6 +66,7 @@ class Scene:
         eye: (3,) direction from the scene's middle to the camera, world axes, unit length.
         legend: what each colour means, in order.
         longest_force: N, the largest force drawn; 0 if there are none.
+        labels: names beside what is drawn, of a task that has no hand yet.
     """
 
     commands: list[bytes]
@@ -71,6 +74,7 @@ class Scene:
     eye: np.ndarray
     legend: list[tuple[str, Color]]
     longest_force: float
+    labels: tuple[Label, ...] = ()
 
 
 def draw_scene(design: Result) -> Scene:
@@ -96,15 +100,15 @@ def draw_scene(design: Result) -> Scene:
     if task.ground is not None:
         _draw_ground(root["ground"], middle, radius, task.ground.height)
     force = _draw_forces(root, tracks, design.motion, radius) if design.motion else 0.0
+    labels: tuple[Label, ...] = ()
+    if design.hand is None:
+        contacts = _draw_contacts(root["object"], task, radius)
+        labels = (*contacts, *goal_labels(root["goals"], task, GOAL_COLOR))
     if len(timeline.time) > 1:
         recorder.send(SetAnimation(tracks.animation, play=False, repetitions=1))
-    return Scene(recorder.commands, timeline.time, eye_towards(task.palm.rotation[:, 2]), _legend(design), force)
-
-
-def bare_palm(design: Result) -> Hand:
-    """The task's palm as a hand without fingers, for which limits and density mean nothing."""
-    palm = design.task.palm
-    return Hand(palm.radius, palm.thickness, (), 0.0, 0.0, 0.0, 0.0, design.task.hand.density)
+    return Scene(
+        recorder.commands, timeline.time, eye_towards(task.palm.rotation[:, 2]), _legend(design), force, labels
+    )
 
 
 def _draw_hand(root: Any, tracks: Tracks, hand: Robot, timeline: Timeline) -> None:
@@ -146,18 +150,15 @@ def _draw_goals(node: Any, design: Result, item: Robot, radius: float) -> None:
         # First the ghost's depth alone, then its colour: otherwise its spheres show through its cylinders.
         depth = MeshBasicMaterial(transparent=True, colorWrite=False)
         ghost = MeshLambertMaterial(color=_hex(GOAL_COLOR), opacity=0.2, transparent=True)
-        drawn: list[np.ndarray] = []
-        for pose in goal_poses(task):
-            if any(np.allclose(pose, other, atol=1e-6 * radius) for other in drawn):
-                continue
-            goal = node[f"goal{len(drawn)}"]
-            goal.set_transform(pose)
+        places = goal_poses(task)
+        for drawn, group in enumerate(distinct_goals(places, 1e-6 * task.object.characteristic_length)):
+            goal = node[f"goal{drawn}"]
+            goal.set_transform(places[group[0]])
             for k, shape in enumerate(item.shapes):
                 # A little thinner, so that an object at its goal hides the ghost instead of mixing with it.
                 shape = shape.shrunk(_THINNER)
                 _draw_shape(goal[f"shape{k}"]["depth"], shape, depth, layer=1)
                 _draw_shape(goal[f"shape{k}"]["color"], shape, ghost, layer=2)
-            drawn.append(pose)
         return
     for k, goal in enumerate(task.motion):
         node[f"goal{k}"].set_object(Sphere(_MARKER * radius), MeshLambertMaterial(color=_hex(GOAL_COLOR)))
@@ -166,6 +167,16 @@ def _draw_goals(node: Any, design: Result, item: Robot, radius: float) -> None:
         places = poses(design.motion.object_position, design.motion.object_orientation)
         path = places[:, :3, :3] @ np.array(task.tool) + places[:, :3, 3]
         node["path"].set_object(Line(PointsGeometry(path.T), LineBasicMaterial(color=_hex(GOAL_COLOR))))
+
+
+def _draw_contacts(node: Any, task: Task, radius: float) -> Iterator[Label]:
+    """Draw where fingertips shall touch as dots on the object, and name them; those to be placed have no place yet."""
+    for i, (name, finger) in enumerate(task.fingers.items()):
+        if finger.is_placed:
+            dot = node[f"contact_{name}"]
+            dot.set_object(Sphere(_MARKER * radius), MeshLambertMaterial(color=_hex(finger_color(i))))
+            dot.set_transform(_shift(np.array(finger.point)))
+            yield Label(steps(dot), name, finger_color(i))
 
 
 def _draw_ground(node: Any, middle: np.ndarray, radius: float, height: float) -> None:
@@ -262,8 +273,8 @@ def eye_towards(facing: np.ndarray) -> np.ndarray:
 
 def _legend(design: Result) -> list[tuple[str, Color]]:
     """Names of what has a colour of its own."""
-    fingers = design.hand.fingers if design.hand else ()
-    legend = [(finger.name, finger_color(i)) for i, finger in enumerate(fingers)]
+    names = [finger.name for finger in design.hand.fingers] if design.hand else design.task.fingers
+    legend = [(name, finger_color(i)) for i, name in enumerate(names)]
     legend.append(("goal", GOAL_COLOR))
     if design.motion is not None and design.motion.contact_force.any():
         legend.append(("contact force", FORCE_COLOR))

@@ -1,0 +1,106 @@
+"""A task that nothing was solved for is drawn with its contacts and goals, each by its name."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from base64 import b64decode
+
+import numpy as np
+import pytest
+import umsgpack
+from typer.testing import CliRunner
+
+from casadi_hands.cli.app import app
+from casadi_hands.errors import DesignError
+from casadi_hands.export.page.task_page import write_task_page
+from casadi_hands.task import load_task
+from tests.documents import ROOT
+from tests.export.example import example_design, example_task
+
+
+def page_data(path):
+    text = path.read_text(encoding="utf-8")
+    return json.loads(re.search(r'<script id="design" type="application/json">(.*?)</script>', text)[1])
+
+
+def placed(data):
+    """World positions (3,), m times the page's scale, of all nodes by path."""
+    local = {}
+    for command in (umsgpack.unpackb(b64decode(each)) for each in data["commands"]):
+        if command["type"] == "set_transform":
+            local[command["path"].strip("/")] = np.reshape(command["matrix"], (4, 4), order="F")
+    found = {}
+    for path in local:
+        steps, pose = path.split("/"), np.eye(4)
+        for end in range(1, len(steps) + 1):
+            pose = pose @ local.get("/".join(steps[:end]), np.eye(4))
+        found[path] = pose
+    return found
+
+
+def test_contacts_and_goals_stand_where_the_task_has_them(tmp_path):
+    task = example_task()
+    write_task_page(task, tmp_path / "task.html", "not solved")
+    data = page_data(tmp_path / "task.html")
+    poses = placed(data)
+    assert [label["text"] for label in data["labels"]] == [*task.fingers, "start, 2 s", "1 s"]
+    by_text = {label["text"]: poses["/".join(label["path"])] for label in data["labels"]}
+    scale = np.linalg.norm(poses["design"][:3, 0])
+    start, other = by_text["start, 2 s"][:3, 3], by_text["1 s"]
+    # What the example's text says, in millimetres from the first goal.
+    expected = {"thumb": [0, 20, -10], "index": [0, -20, 20], "middle": [0, -20, -30]}
+    for name, place in expected.items():
+        assert 1e3 / scale * (by_text[name][:3, 3] - start) == pytest.approx(place, abs=1e-3)
+    assert 1e3 / scale * (other[:3, 3] - start) == pytest.approx([40, 0, 0], abs=1e-3)
+    assert other[:2, 0] / scale == pytest.approx([np.cos(np.radians(30)), np.sin(np.radians(30))], abs=1e-6)
+
+
+def test_a_design_with_a_hand_has_no_such_names(tmp_path):
+    example_design().save(tmp_path)
+    assert page_data(tmp_path / "viewer.html")["labels"] == []
+
+
+def test_a_place_that_cannot_be_written_is_named(tmp_path):
+    with pytest.raises(DesignError, match=r"none/task\.html: cannot be written: No such file"):
+        write_task_page(example_task(), tmp_path / "none" / "task.html", "")
+
+
+def test_check_shows_a_drawing_task(tmp_path):
+    file, page = ROOT / "problems/draw_box.yaml", tmp_path / "task.html"
+    result = CliRunner().invoke(app, ["check", str(file), "--show", str(page)])
+    assert result.exit_code == 0
+    assert result.output.splitlines()[-1] == str(page)
+    texts = [label["text"] for label in page_data(page)["labels"]]
+    assert texts == [*load_task(file).fingers, "start", "2 s", "4 s", "6 s", "8 s"]
+
+
+def test_a_browser_puts_the_names_beside_what_they_name(tmp_path):
+    chromium = shutil.which("chromium") or shutil.which("google-chrome")
+    if chromium is None:
+        pytest.skip("no browser that runs without a screen")
+    page = tmp_path / "task.html"
+    write_task_page(example_task(), page, "not solved")
+    # Where the browser's own library puts the dots, told in the page for the test.
+    probe = """<script>setTimeout(() => { const told = [...document.querySelectorAll(".label")].map((label) => {
+      const entry = design.labels.find((each) => each.text === label.textContent);
+      const at = viewer.scene_tree.find(entry.path).object.getWorldPosition(viewer.camera.position.clone());
+      at.project(viewer.camera);
+      const box = label.getBoundingClientRect();
+      return [label.textContent, box.left - (at.x + 1) / 2 * innerWidth, box.top - (1 - at.y) / 2 * innerHeight,
+        box.width, at.x, at.y];
+    }); document.body.dataset.told = JSON.stringify(told); }, 1500);</script></body>"""
+    page.write_text(page.read_text().replace("</body>", probe))
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+    options += ["--virtual-time-budget=4000", "--window-size=1440,900", f"--user-data-dir={tmp_path / 'profile'}"]
+    ran = subprocess.run([chromium, *options, "--dump-dom", page.as_uri()], capture_output=True, timeout=120, text=True)
+    told = json.loads(re.search(r'data-told="([^"]*)"', ran.stdout)[1].replace("&quot;", '"'))
+    assert {name for name, *_ in told} == {"thumb", "index", "middle", "start, 2 s", "1 s"}
+    for _, right, below, width, x, y in told:
+        assert right == pytest.approx(9, abs=1)
+        assert -10 < below < 60
+        assert width > 20
+        assert abs(x) < 1
+        assert abs(y) < 1
