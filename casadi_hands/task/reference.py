@@ -28,8 +28,8 @@ def _sections(section: type[Section], name: str) -> Iterator[tuple[str, type[Sec
     for field_name, field in fields_of(section).items():
         for inner in sections_in(field.annotation):
             path = f"{name}.{field_name}" if name else field_name
-            if "list" in _shape(field) or "mapping" in _shape(field):
-                path += "[]" if "list" in _shape(field) else ".<name>"
+            if "list" in shape_of(field) or "mapping" in shape_of(field):
+                path += "[]" if "list" in shape_of(field) else ".<name>"
             if len(sections_in(field.annotation)) > 1:
                 path += f".{inner.__name__.lower()}"
             yield from _sections(inner, path)
@@ -44,7 +44,7 @@ def _table(name: str, section: type[Section]) -> Iterator[str]:
     yield "| field | default | meaning |"
     yield "|---|---|---|"
     for field_name, field in fields_of(section).items():
-        yield f"| `{field_name}` | {_default(field)} | {field.description} |"
+        yield f"| `{field_name}` | {default_text(field)} | {field.description} |"
     if section is Rotation:
         yield "| `quaternion` | | Instead of axis and degrees: [w, x, y, z], object to world, of any length but 0. |"
 
@@ -72,12 +72,14 @@ def _bounds() -> Iterator[str]:
     yield f"| the file, aliases written out | | {MOST_NODES} | names and values, in {MOST_LEVELS} levels |"
 
 
-def _shape(field: FieldInfo) -> str:
+def shape_of(field: FieldInfo) -> str:
+    """Whether a field holds a ``list`` of sections, a ``mapping`` from names to them, or ``one`` value."""
     text = str(field.annotation)
     return "mapping" if "dict[" in text else "list" if "..." in text else "one"
 
 
-def _default(field: FieldInfo) -> str:
+def default_text(field: FieldInfo) -> str:
+    """What a field is where a file does not give it, in words."""
     extra = field.json_schema_extra
     if isinstance(extra, dict) and "default" in extra:
         return str(extra["default"])
