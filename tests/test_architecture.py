@@ -21,7 +21,7 @@ FLOORS = (
     {"problem"},
     {"stages", "verify", "placement"},
     {"export", "diagnosis"},
-    {"pipeline"},
+    {"pipeline", "studio"},
     {"__init__", "cli"},  # and scripts
 )
 LONGEST = 300  # lines of a module

@@ -11,8 +11,10 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from casadi_hands.cli.check import check
 from casadi_hands.cli.options import Folder, Jobs, Seed, Stage, TaskFile
 from casadi_hands.cli.starting import examples, fields, new, schema
+from casadi_hands.cli.studio import studio
 
 app = typer.Typer(
     name="casadi-hands",
@@ -139,15 +141,8 @@ def formulate(
         print(formulate(problem, stage.value, seed, jobs=jobs, progress=reporter.progress).save(out))
 
 
-@app.command(epilog="Example: `casadi-hands check task.yaml`")
-def check(task: TaskFile) -> None:
-    """Check a task file and print how it is understood; solves nothing. Exits 1 where no hand can do the task."""
-    from casadi_hands.cli.task_summary import check_summary
-    from casadi_hands.task.loader import load_questioned
-
-    text, possible = check_summary(*load_questioned(task))
-    Console().print(text)
-    raise typer.Exit(0 if possible else 1)
+app.command(epilog="Example: `casadi-hands check task.yaml --show task.html`")(check)
+app.command(epilog="Example: `casadi-hands studio task.yaml`")(studio)
 
 
 @app.command(epilog="Example: `casadi-hands view results/task`")

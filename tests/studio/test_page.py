@@ -1,0 +1,136 @@
+"""The studio in a browser without a network: what the mouse and the keys do is what the file says."""
+
+from __future__ import annotations
+
+import time
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+
+from casadi_hands.studio.session import STARTER, Session
+from casadi_hands.task import load_task
+from tests.studio.browser import CHROMIUM, Browser
+
+viser = pytest.importorskip("viser")
+iio = pytest.importorskip("imageio.v3")
+
+FIELD = """[...document.querySelectorAll("label, .mantine-Text-root")].find((e) => e.textContent === "%s")
+  .closest(".mantine-Flex-root").querySelector("input")"""
+
+
+@pytest.fixture
+def studio(tmp_path):
+    from casadi_hands.studio.access import open_server
+    from casadi_hands.studio.studio import Studio
+
+    server, address = open_server(label="task")
+    page = Studio(server, Session(tmp_path / "task.yaml"), ("false",), tmp_path / "result")
+    yield page, address
+    page.close()
+    server.stop()
+
+
+@pytest.fixture
+def browser(tmp_path):
+    if CHROMIUM is None:
+        pytest.skip("no browser that runs without a screen")
+    with Browser(tmp_path / "profile") as browser:
+        yield browser
+
+
+def picture(browser, path):
+    browser.screenshot(path)
+    return iio.imread(path)[..., :3].astype(int)
+
+
+def until(found, seconds=30.0):
+    end = time.monotonic() + seconds
+    while not (value := found()):
+        assert time.monotonic() < end
+        time.sleep(0.2)
+    return value
+
+
+def test_the_page_edits_the_file_and_asks_nobody_else(studio, browser, tmp_path):
+    page, address = studio
+    browser.send("Page.navigate", url=address)
+    assert browser.wait('document.querySelector("textarea")?.value') == STARTER
+    time.sleep(4)  # the picture comes a little later
+    before = picture(browser, tmp_path / "before.png")
+    assert len(np.unique(before.reshape(-1, 3), axis=0)) > 200  # not a blank page
+
+    # A gizmo: its upward arrow is what is blue now and was not.
+    page.choose(("motion", 1))
+    time.sleep(2)
+    after = picture(browser, tmp_path / "gizmo.png")
+    blue = (after[..., 2] - after[..., 0] > 40) & (np.abs(after - before).sum(axis=2) > 60)
+    blue[:, :440] = blue[:, 1070:] = False
+    rows, columns = np.nonzero(blue)
+    tip = float(rows.min() + 12)
+    x = float(np.median(columns[np.abs(rows - tip) < 4]))
+    browser.drag((x, tip), (x, tip - 60))
+    until(lambda: page.session.text != STARTER)
+    first, second = page.session.understood.written.motion
+    assert first.position == (0.09, 0.0, 0.3)
+    assert second.position[:2] == (0.09, 0.02)
+    assert 0.31 < second.position[2] < 0.4
+    browser.wait(f'document.querySelector("textarea").value.includes("{second.position[2]}")')
+
+    # A field.
+    browser.evaluate(f"{FIELD % 'mass'}.select()")
+    browser.evaluate(f"{FIELD % 'mass'}.focus()")
+    browser.send("Input.insertText", text="0.25")
+    until(lambda: page.session.understood.written and page.session.understood.written.object.mass == 0.25)
+    browser.wait('document.querySelector("textarea").value.includes("mass: 0.25")')
+
+    # What is typed and refused stays to be mended, and changes nothing.
+    kept = page.session.text
+    browser.evaluate(f"{FIELD % 'shapes'}.focus()")
+    browser.evaluate(f"{FIELD % 'shapes'}.select()")
+    browser.send("Input.insertText", text="[sphere: {center")
+    time.sleep(3)
+    assert browser.evaluate(f"{FIELD % 'shapes'}.value") == "[sphere: {center"
+    assert page.session.text == kept
+    browser.evaluate(f"{FIELD % 'shapes'}.select()")
+    browser.send("Input.insertText", text="[capsule: {start: [0, 0, -0.03], end: [0, 0, 0.03], radius: 0.02}]")
+    browser.wait('document.querySelector("textarea").value.includes("-0.03]")')
+
+    # The text, and what check says of it.
+    browser.evaluate('document.querySelector("textarea").focus()')
+    browser.evaluate('document.querySelector("textarea").setSelectionRange(1e6, 1e6)')
+    browser.send("Input.insertText", text="gravty: [0, 0, 0]\n")
+    assert "did you mean gravity?" in browser.wait('document.querySelector(".studio .bad")?.textContent')
+    browser.evaluate("[...document.querySelectorAll('button')].find((e) => e.textContent === 'undo').click()")
+    browser.wait('!document.querySelector(".studio .bad")')
+
+    # The file.
+    assert not page.session.path.exists()
+    browser.evaluate("[...document.querySelectorAll('button')].find((e) => e.textContent === 'save').click()")
+    until(page.session.path.exists)
+    task = load_task(page.session.path)
+    assert task.object.mass == 0.25
+    assert task.motion[1].position == second.position
+
+    picture(browser, tmp_path / "end.png")
+    assert browser.errors == []
+    hosts = {urlsplit(each.removeprefix("blob:")).netloc for each in browser.requests if not each.startswith("data:")}
+    assert hosts == {urlsplit(address).netloc}
+
+
+def test_a_hand_that_comes_is_shown_and_moves(studio, browser, tmp_path):
+    from tests.export.example import example_design
+
+    page, address = studio
+    browser.send("Page.navigate", url=address)
+    browser.wait('document.querySelector("textarea")?.value')
+    example_design().save(tmp_path / "result")
+    browser.wait('document.body.innerText.includes("made by hand")')
+    page.results.show_hand()
+    time.sleep(3)
+    one = picture(browser, tmp_path / "one.png")
+    time.sleep(0.7)
+    other = picture(browser, tmp_path / "other.png")
+    middle = np.s_[200:700, 450:1060]
+    assert (np.abs(one - other)[middle].sum(axis=2) > 60).sum() > 200
+    assert browser.errors == []
