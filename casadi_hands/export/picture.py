@@ -13,8 +13,8 @@ from casadi_hands.export.markup import GROUND_COLOR, Color
 from casadi_hands.export.meshes import mesh_path, polytopes
 from casadi_hands.export.page.robot import Robot, Shape
 from casadi_hands.export.page.scene import eye_towards
-from casadi_hands.export.page.unsolved import bare_palm
 from casadi_hands.export.page.timeline import design_timeline
+from casadi_hands.export.page.unsolved import bare_palm
 from casadi_hands.export.urdf import hand_urdf, object_urdf
 from casadi_hands.problem.result import Result
 

@@ -80,7 +80,7 @@ class TaskDrawing:
                 position=(0.0, 0.0, -palm.thickness / 2),
             )
             return [body]
-        if place.kind == "goal":
+        if place.kind in ("goal", "joint goal"):
             first = place.path == ("motion", 0)
             return [_add_shape(scene, f"{name}/{k}", shape, first) for k, shape in enumerate(item.shapes)]
         if place.kind == "tool goal":
@@ -101,7 +101,7 @@ def names_of(task: Task) -> list[tuple[Path, str, np.ndarray]]:
     near = 0.1 * task.object.characteristic_length
     for each in places(task):
         local = np.zeros(3)
-        if each.kind == "goal":
+        if each.kind in ("goal", "joint goal"):
             lower, upper = task.object.bounding_box
             longest = int(np.argmax(upper - lower))
             local = (lower + upper) / 2

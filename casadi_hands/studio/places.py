@@ -22,7 +22,8 @@ class Place:
 
     Attributes:
         path: of its section in the file.
-        kind: ``palm``, ``waypoint``, ``goal``, ``tool goal`` (a point of a drawing) or ``contact``.
+        kind: ``palm``, ``waypoint``, ``goal``, ``tool goal`` (a point of a drawing), ``joint goal`` (of an object on a
+            joint, which the file places by an angle or a distance) or ``contact``.
         name: for people.
         position: (3,) m, world.
         rotation: (3, 3) world <- it; of contacts the object's at the start.
@@ -41,6 +42,11 @@ class Place:
             if self.name.startswith(before):
                 return self.name.removeprefix(before)
         return self.name
+
+    @property
+    def moves(self) -> bool:
+        """Whether it can be moved."""
+        return self.kind != "joint goal"
 
     @property
     def turns(self) -> bool:
@@ -119,7 +125,7 @@ def with_goal(text: str, task: Task) -> str:
 
 def with_finger(text: str, task: Task, name: str) -> str:
     """The text with one more finger, which touches as far from the others' contacts as an axis leads."""
-    taken = np.array([finger.touches for finger in task.fingers.values()])
+    taken = [np.array(finger.point) for finger in task.fingers.values() if finger.is_placed]
     candidates = []
     for shape in task.object.shapes:
         lower, upper = shape.bounding_box
@@ -129,7 +135,7 @@ def with_finger(text: str, task: Task, name: str) -> str:
                 beyond = middle.copy()
                 beyond[axis] = end[axis]
                 candidates.append(shape.body.on_surface(middle + 0.999 * (beyond - middle)))
-    clear = [min(np.linalg.norm(taken - point, axis=1)) for point in candidates]
+    clear = [min((float(np.linalg.norm(each - point)) for each in taken), default=0.0) for point in candidates]
     return with_value(text, ("fingers", name), {"touches": _point(candidates[int(np.argmax(clear))])})
 
 
@@ -152,14 +158,18 @@ def _goal_places(task: Task) -> Iterator[Place]:
             where = np.array(goal.tool_at)
             yield Place(("motion", number), "tool goal", f"tool, {name}", where, np.eye(3))
         else:
-            where = np.array(goal.position, float)
-            yield Place(("motion", number), "goal", f"object, {name}", where, goal.rotation.matrix)
+            kind = "joint goal" if goal.on_joint else "goal"
+            where = np.array(task.goal_poses()[number][1], float)
+            yield Place(("motion", number), kind, f"object, {name}", where, goal.rotation.matrix)
 
 
 def _contact_places(task: Task) -> Iterator[Place]:
     origin, turn = _start(task)
-    points = [(("fingers", name, "touches"), "contact", name, each.touches) for name, each in task.fingers.items()]
-    found = [Place(path, kind, f"contact {name}", np.array(at, float), turn) for path, kind, name, at in points]
+    placed = {name: each.point for name, each in task.fingers.items() if each.is_placed}
+    found = [
+        Place(("fingers", name, "touches"), "contact", f"contact {name}", np.array(at, float), turn)
+        for name, at in placed.items()
+    ]
     if task.ground is not None:
         at = np.array(task.ground.touches)
         found.append(Place(("ground", "touches"), "contact", "contact with the ground", at, turn))

@@ -204,7 +204,7 @@ class Studio:
             if list(self._choice.options) != options:
                 self._choice.options = options
             self._choice.value = place.name if place else _NOTHING
-            if place is not None and self.session.understood.written is not None:
+            if place is not None and place.moves and self.session.understood.written is not None:
                 self._add_gizmo(place)
 
     def _add_gizmo(self, place: Place) -> None:

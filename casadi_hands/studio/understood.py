@@ -9,6 +9,7 @@ from pydantic import ValidationError
 
 from casadi_hands.diagnosis.impossible import findings
 from casadi_hands.errors import HandsError, TaskError
+from casadi_hands.placement.place import propose
 from casadi_hands.problem.si import build_model
 from casadi_hands.task import Task
 from casadi_hands.task.loader import parse_questioned
@@ -53,10 +54,14 @@ def understand(text: str, path: Path) -> Understood:
         task, questions = parse_questioned(text, path.name, path.stem, path.parent)
     except HandsError as error:
         return Understood(written, tuple(str(error).splitlines()))
+    proposal = None if task.is_placed else propose(task)
+    if proposal is not None and proposal.sets:
+        task = proposal.sets[0].in_task(task)
     found = findings(task, build_model(task))
+    unplaced = (proposal.reason,) if proposal is not None and not proposal.sets else ()
     return Understood(
         written,
-        impossible=tuple(each.reason.text for each in found if each.certain),
+        impossible=(*unplaced, *(each.reason.text for each in found if each.certain)),
         doubts=tuple(each.reason.text for each in found if not each.certain),
         questions=tuple(questions),
     )

@@ -233,3 +233,24 @@ def test_names_in_one_place_are_one():
         "middle",
         "ground",
     ]
+
+
+def test_contacts_that_the_program_places_have_no_place_yet(tmp_path):
+    edited = session(tmp_path)
+    edited.edit(lambda text: with_field(text, ("fingers", "index", "touches"), "anywhere"))
+    assert edited.understood.solvable
+    names = [each.name for each in places(edited.last.written)]
+    assert "contact thumb" in names
+    assert "contact index" not in names
+    edited.edit(lambda text: with_field(text, ("fingers",), "3"))
+    assert edited.understood.refusals == ()
+    assert not [each for each in places(edited.last.written) if each.kind == "contact"]
+
+
+def test_goals_of_an_object_on_a_joint_are_moved_by_their_angle(tmp_path):
+    edited = session(tmp_path)
+    joint = "{hinge: {point: [0, 0, 0], axis: [0, 0, 1]}}"
+    edited.edit(lambda text: with_field(text, ("object", "attached"), joint))
+    edited.edit(lambda text: with_field(text, ("motion", 1), "{at: 1, angle: 20}"))
+    assert edited.understood.refusals == ()
+    assert [each.moves for each in places(edited.last.written) if each.path[0] == "motion"] == [True, False]
