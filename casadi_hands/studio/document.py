@@ -65,7 +65,7 @@ def typed(words: str) -> Any:
     """
     data = TaskFile(f"value: {words}", "given").data
     if list(data) != ["value"]:
-        raise TaskError(f"given {escaped(words)}; a field has one value")
+        raise TaskError(f"given {escaped(words)}; allowed: one value")
     return data["value"]
 
 
@@ -129,7 +129,7 @@ def _loaded(text: str) -> Any:
     try:
         return _yaml(text).load(text)
     except (YAMLError, ValueError) as error:
-        raise TaskError(f"task: not YAML: {str(error).splitlines()[0]}") from None
+        raise TaskError(f"task: not YAML; mend {str(error).splitlines()[0]}") from None
 
 
 def _dumped(root: Any, before: str) -> str:
@@ -164,7 +164,9 @@ def _put(place: Any, step: str | int, value: Any, path: Path) -> None:
     elif isinstance(place, Mapping) and isinstance(step, str):
         place[step] = value  # type: ignore[index]
     else:
-        raise TaskError(f"the task has no place for {'.'.join(map(str, path))}: {step} would not be in a section")
+        raise TaskError(
+            f"the task has no place for {'.'.join(map(str, path))}: {step} would not be in a section; give one there"
+        )
 
 
 def _flow(value: Any) -> Any:

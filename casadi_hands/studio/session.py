@@ -87,12 +87,14 @@ class Session:
         there = read(self.path) if self.path.exists() else None
         if there is not None and there not in (self._saved, self.text):
             self._saved = there
-            raise TaskError(f"{self.path} was changed by another program; reload it, or save again to replace it")
+            raise TaskError(
+                f"{self.path} was changed by another program; try reload to see it, or save again to replace it"
+            )
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self.path.write_text(self.text, encoding="utf-8", newline="\n")
         except OSError as error:
-            raise TaskError(f"{self.path}: cannot be written: {error.strerror}") from None
+            raise TaskError(f"{self.path}: cannot be written: {error.strerror}; give a path that can") from None
         self._saved = self.text
 
     def reload(self) -> None:

@@ -163,7 +163,7 @@ class Studio:
         """
         with self._lock:
             if not self.session.understood.solvable:
-                raise HandsError("Mend first what check says of the task.")
+                raise HandsError("before it is solved, mend what check says of the task")
             if self.session.unsaved:
                 self.session.save()
             self._show()
