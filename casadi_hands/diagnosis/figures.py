@@ -107,6 +107,7 @@ _ADVICE = {
     "torsion_excess": "softer fingertips (fingertip.torsion) or more fingers",
     "torsion_shortfall": "harder fingertips (fingertip.torsion) or more joints (search.max_joints)",
     "slide_shortfall": "a smaller time_step, or more joints (search.max_joints)",
+    "attachment_shortfall": "a smaller time_step, or a motion that does not pause or turn back between goals",
     "gap": "more joints (search.max_joints) or contacts nearer the palm",
     "gap_between": "a smaller time_step or more joints (search.max_joints)",
     "slip": "more joints (search.max_joints), or limits.slip as wide as you can accept",

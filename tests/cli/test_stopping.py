@@ -133,9 +133,9 @@ def test_a_full_disk_is_one_message_and_leaves_no_empty_files(task_file: Path, t
         preexec_fn=small_files,
     )
     assert found.returncode == 2
-    assert (
-        found.stderr.splitlines()[-1] == f"casadi-hands: {tmp_path}/out: cannot write the design here: File too large"
-    )
+    *_, what, remedy = found.stderr.splitlines()
+    assert what == f"casadi-hands: {tmp_path}/out: cannot write the design here: File too large"
+    assert remedy == "give another folder, which you may write to"
     assert "Traceback" not in found.stderr
     assert not (tmp_path / "out").exists()
 
