@@ -120,7 +120,7 @@ def test_a_place_that_cannot_be_written_is_an_error_in_words(folder, tmp_path, t
 
 
 def test_an_unknown_target_is_answered_with_those_there_are(folder):
-    with pytest.raises(HandsError, match="'sdf'; there are csv, ros2, urdf, usd"):
+    with pytest.raises(HandsError, match="'sdf'; give one of csv, ros2, urdf, usd"):
         export_design(folder, "sdf")
 
 

@@ -40,11 +40,11 @@ def stopping_at(words: str) -> Any:
 
 
 def content(folder: Path) -> dict[str, Any]:
-    """All files but the page, without times."""
+    """All files but the pages, without times."""
     found: dict[str, Any] = {
         name: (folder / name).read_bytes()
         for name in FILES
-        if (folder / name).exists() and name not in ("result.json", "viewer.html")
+        if (folder / name).exists() and name not in ("result.json", "viewer.html", "report.html")
     }
     record = json.loads((folder / "result.json").read_text(encoding="utf-8"))
     del record["seconds"]

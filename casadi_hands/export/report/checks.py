@@ -32,8 +32,8 @@ def audit_section(design: Result) -> Html:
         return section("audit", "What was checked", paragraph("Nothing was checked: there is no motion."))
     figures = design.certificate
     missed = [name for name in figures if not figures[name]["holds"]]
-    asked = [name for name in figures if name not in missed and figures[name]["limit"] is not None]
-    others = [name for name in figures if name not in missed and figures[name]["limit"] is None]
+    asked = [name for name in figures if name not in missed and figures[name].get("limit") is not None]
+    others = [name for name in figures if name not in missed and figures[name].get("limit") is None]
     what = f"{len(asked)} of {len(asked) + len(missed)} limits are kept."
     parts = [paragraph(f"Computed anew from the files, by formulas that the design took no part in. {what}")]
     for words, names in (("Missed", missed), ("Kept", asked), ("Told, with no limit", others)):
@@ -44,7 +44,7 @@ def audit_section(design: Result) -> Html:
 
 
 def _figure(hand: Hand | None, name: str, figure: Mapping[str, Any]) -> Html:
-    value, limit, unit = figure["value"], figure["limit"], figure.get("unit", "")
+    value, limit, unit = figure.get("value"), figure.get("limit"), figure.get("unit", "")
     shown = "none" if value is None else _shown(value, unit)
     kind = "bad" if not figure["holds"] else "" if limit is None else "good"
     asked = Html("") if limit is None else _limit(value, limit, unit, figure["holds"])
@@ -84,8 +84,10 @@ def replay_section(design: Result) -> Html:
         return section("replays", title, paragraph("It was not played."))
     parts = []
     for played in design.replays:
-        engine = {"mujoco": "MuJoCo", "drake": "Drake"}.get(str(played["engine"]), str(played["engine"]))
-        planned = "drops the object" if played["dropped_as_planned"] else f"is off the plan by {_off(played['mean'])}"
+        engine = {"mujoco": "MuJoCo", "drake": "Drake"}.get(str(played.get("engine")), str(played.get("engine")))
+        planned = (
+            "drops the object" if played["dropped_as_planned"] else f"is off the plan by {_off(played.get('mean'))}"
+        )
         words = f"Played in {engine} as planned, the hand {planned} on average"
         if played["dropped_as_planned"]:
             words = f"Played in {engine} as planned, the hand drops the object"
@@ -99,7 +101,12 @@ def replay_section(design: Result) -> Html:
         perturbed = played.get("perturbed", {})
         if perturbed:
             rows = [
-                (name, _off(each["mean"]), _off(each["largest"]), badge("drops it", "bad") if each["dropped"] else "")
+                (
+                    name,
+                    _off(each.get("mean")),
+                    _off(each.get("largest")),
+                    badge("drops it", "bad") if each["dropped"] else "",
+                )
                 for name, each in sorted(perturbed.items(), key=lambda item: not item[1]["dropped"])
             ]
             head = ("", "Off the plan on average", "At most", "")
@@ -131,5 +138,7 @@ def _error(mm: float | None, turn: float | None) -> str:
     return ", ".join([*parts, *([f"{turn:.2g}°"] if turn is not None else [])])
 
 
-def _off(error: Mapping[str, Any]) -> str:
+def _off(error: Mapping[str, Any] | None) -> str:
+    if error is None:
+        return ""
     return _error(error.get("mm"), error.get("degrees"))
