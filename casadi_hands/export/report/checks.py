@@ -138,6 +138,10 @@ def _error(mm: float | None, turn: float | None) -> str:
     return ", ".join([*parts, *([f"{turn:.2g}°"] if turn is not None else [])])
 
 
+def _dropped(dropped: bool) -> Html | str:
+    return badge("drops it", "bad") if dropped else ""
+
+
 def _off(error: Mapping[str, Any] | None) -> str:
     if error is None:
         return ""
