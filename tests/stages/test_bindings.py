@@ -22,12 +22,14 @@ import casadi_hands.stages
 from casadi_hands.nlp import Kernel, Parameter, Problem, Rows
 from casadi_hands.nlp.arguments import Argument, arguments_by_name
 from casadi_hands.problem.model import Model, Regrasp
+from casadi_hands.problem.si import build_model
 from casadi_hands.problem.structure import Structure
 from casadi_hands.stages.floating.stage import FloatingStage
 from casadi_hands.stages.refine.problem import RefineProblem
 from casadi_hands.stages.synthesis.stage import SynthesisStage
 from casadi_hands.stages.synthesis.target import target_of
 from casadi_hands.stages.whole_hand.stage import WholeHandStage
+from casadi_hands.task import load_task
 from tests.stages.example import drawing, everything, made_up_floating
 
 
@@ -74,6 +76,11 @@ def refine(model: Model, contacts: tuple[int, ...], joints: tuple[int, ...]) -> 
     return RefineProblem(Structure.of(model, contacts, joints, active), guarded=True)
 
 
+def turned_on_its_shaft() -> Model:
+    """An object that a hinge holds to the world."""
+    return build_model(load_task(Path(__file__).parents[2] / "problems" / "objects" / "knob.yaml"))
+
+
 # The task with everything has a ground, primitives, disturbances, a palm that moves, limits of torque and speed.
 # Fingers of equally many joints can be taken for each other; of two and three joints, angles for bases, points and
 # forces; and the wrench of two contacts for their points and forces.
@@ -101,6 +108,7 @@ BUILD: dict[str, Callable[[], object]] = {
     ),
     "refine, servos": lambda: refine(replace(everything()[1], servo=0.4), (0, 1, 2), (2, 2, 3)),
     "refine, shared motors": lambda: refine(replace(everything()[1], motors=2), (0, 1, 2), (2, 2, 3)),
+    "refine, on a joint": lambda: refine(turned_on_its_shaft(), (0, 1, 2), (2, 2, 3)),
     "refine, drawing": lambda: refine(drawing()[1], (0, 1), (3, 3)),
     "refine, one joint": lambda: refine(drawing()[1], (1, 0), (1, 1)),
 }
