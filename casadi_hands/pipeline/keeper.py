@@ -77,11 +77,11 @@ def rival_in(out: Path, task: Task, force: bool = False) -> Design | None:
     except DesignError as error:
         if force:
             return None
-        raise DesignError(f"{shown(out)}: holds a result that cannot be read ({error}); {_REMEDY}") from error
+        raise DesignError(f"{shown(out)}: holds a result that cannot be read ({error})", _REMEDY) from error
     same = _asked(found.task) == _asked(task)
     if not force and (found.status == "certified" or (not same and found.status != "failed")):
         which = "this task" if same else f"another task ({found.task.name})"
-        raise DesignError(f"{shown(out)}: holds a {found.status} result of {which} already; {_REMEDY}")
+        raise DesignError(f"{shown(out)}: holds a {found.status} result of {which} already", _REMEDY)
     judged = bool(found.certificate) and (same or found.status != "failed")
     return found if judged else None
 

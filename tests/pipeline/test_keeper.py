@@ -30,8 +30,9 @@ def searched_otherwise() -> Task:
 def test_a_certified_result_is_not_replaced_unasked(tmp_path: Path) -> None:
     judged("certified").save(tmp_path)
     for task, words in ((example_task(), "this task"), (searched_otherwise(), "this task"), (other_task(), "another ")):
-        with pytest.raises(DesignError, match=f"holds a certified result of {words}.*already; --force replaces it"):
+        with pytest.raises(DesignError, match=f"holds a certified result of {words}.*already$") as refused:
             rival_in(tmp_path, task)
+        assert refused.value.__notes__ == ["--force replaces it when there is another, --out names another folder"]
         assert rival_in(tmp_path, task, force=True) is not None
 
 
