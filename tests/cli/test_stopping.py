@@ -158,7 +158,8 @@ def test_a_certified_result_is_named_with_the_way_to_replace_it(task_file: Path,
     replace(example_design(), status="certified").save(tmp_path / "out")
     found = run(task_file, "--out", tmp_path / "out")
     assert isinstance(found.exception, DesignError)
-    assert "holds a certified result of another task (move a capsule & back) already; --force" in str(found.exception)
+    assert "holds a certified result of another task (move a capsule & back) already" in str(found.exception)
+    assert "--force" in found.exception.__notes__[0]
 
 
 def test_force_and_what_was_asked_for_reach_the_solve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -188,9 +188,9 @@ def test_a_certified_result_is_refused_before_anything_is_computed(tmp_path: Pat
     record = json.loads((tmp_path / "out/result.json").read_text())
     (tmp_path / "out/result.json").write_text(json.dumps({**record, "status": "certified"}))
     ran = len(solves)
-    with pytest.raises(DesignError, match="holds a certified result of this task already; --force"):
+    with pytest.raises(DesignError, match="holds a certified result of this task already\n--force"):
         solve(TASK, jobs=1, out=tmp_path / "out", until="floating")
-    with pytest.raises(DesignError, match="holds a certified result of this task already; --force"):
+    with pytest.raises(DesignError, match="holds a certified result of this task already\n--force"):
         explore(TASK, seeds=[0, 1], jobs=1, out=tmp_path / "out", until="floating")
     assert len(solves) == ran
     solve(TASK, jobs=1, out=tmp_path / "out", until="floating", force=True)
