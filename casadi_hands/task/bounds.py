@@ -149,11 +149,12 @@ def _bound(value: Any, path: tuple[str | int, ...], name: str) -> Iterator[Probl
             return
     if isinstance(value, dict):
         for key, each in value.items():
-            if name == "fingers" and len(key) > LONGEST_FINGER:
+            named = path == ("fingers",)
+            if named and len(key) > LONGEST_FINGER:
                 allowed = f"names of at most {LONGEST_FINGER} characters"
                 yield Problem(path, f"{shown(key)}, {len(key)} characters", allowed)
                 continue
-            inner = name if name == "fingers" else f"{name}.{key}" if name else key
+            inner = name if named else f"{name}.{key}" if name else key
             yield from _bound(each, (*path, key), inner)
     elif isinstance(value, list | tuple):
         yield from _direction(value, path, name)

@@ -124,6 +124,16 @@ REFUSED = {
         "object.shapes[0].sphere.radius: given 1e+200; allowed: at most 100000 m in size",
     ),
     "an electron": (MASS, "mass: 1e-30", "object.mass: given 1e-30; allowed: at least 1e-06 kg"),
+    "a contact beyond the stars": (
+        "[0.03, 0, 0]",
+        "[1e200, 0, 0]",
+        "fingers.thumb.touches[0]: given 1e+200; allowed: at most 100000 m in size",
+    ),
+    "a region beyond the stars": (
+        "[0.03, 0, 0]",
+        "{near: [0.03, 0, 0], within: 1e200}",
+        "fingers.thumb.touches.within: given 1e+200; allowed: at most 100000 m in size",
+    ),
     "gravity of a dwarf star": (
         "object:",
         "gravity: [0, 0, -1e5]\nobject:",
@@ -208,6 +218,11 @@ def test_every_bound_is_one_of_a_field() -> None:
     for end in RANGES:
         assert any(f".{path}".endswith(f".{end}") for path in paths), end
     assert set(COUNTS) <= set(paths)
+
+
+def test_a_finger_has_no_bound_of_how_many_fingers_there_are() -> None:
+    names = [f"s{i}" for i in range(COUNTS["fingers"] + 1)]
+    assert bound({"fingers": {"thumb": {"touches": {"on": names}}}}) == []
 
 
 def test_what_the_schema_judges_is_left_to_it() -> None:
