@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
@@ -223,7 +224,7 @@ def _list(values: Sequence[float]) -> str:
 
 def _quoted(name: str) -> str:
     """Text as YAML takes it whatever is in it."""
-    plain = name.replace(" ", "").replace("-", "").replace("_", "")
-    if plain.isalpha() and plain.isascii() and plain.lower() not in ("true", "false", "null", "yes", "no", "on", "off"):
+    plain = re.fullmatch(r"[A-Za-z]([A-Za-z _-]*[A-Za-z])?", name)
+    if plain and name.lower() not in ("true", "false", "null", "yes", "no", "on", "off"):
         return name
     return "'" + name.replace("'", "''") + "'"

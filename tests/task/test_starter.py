@@ -88,7 +88,9 @@ def test_fingertips_need_room() -> None:
     assert len(parse_task(starter(Idea("x", size=(300, 40), fingers=5))).fingers) == 5
 
 
-@pytest.mark.parametrize("name", ["a: b", "#1", "it's", "true", "null", "3", "-", "ümlaut"])
+@pytest.mark.parametrize(
+    "name", ["a: b", "#1", "it's", "true", "null", "3", "-", "- a", " a ", "two-words_and more", "ümlaut"]
+)
 def test_any_name_is_the_task_s(name: str) -> None:
     assert parse_task(starter(Idea(name))).name == name
 
