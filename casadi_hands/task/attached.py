@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
+from casadi_hands.motion.quaternion import quaternion
 from casadi_hands.task.fields import NonNegative, Number, Section, Vector, refuse
 from casadi_hands.task.rotation import Rotation, rotation_matrix
 
@@ -91,17 +92,7 @@ def _turned(rotation: Rotation, axis: np.ndarray, angle: float) -> Rotation:
         x, y, z = axis.tolist()
         return Rotation(axis=(x, y, z), degrees=float(np.degrees(angle + start @ axis)))
     matrix = rotation_matrix(angle * axis) @ rotation.matrix
-    w, x, y, z = _quaternion(matrix)
-    return Rotation.model_validate({"quaternion": [w, x, y, z]})
-
-
-def _quaternion(matrix: np.ndarray) -> list[float]:
-    """[w, x, y, z] of a rotation matrix, as its dominant eigenvector."""
-    (a, b, c), (d, e, f), (g, h, i) = matrix
-    rows = [[a + e + i, h - f, c - g, d - b], [h - f, a - e - i, b + d, c + g]]
-    rows += [[c - g, b + d, e - a - i, f + h], [d - b, c + g, f + h, i - a - e]]
-    found: list[float] = np.linalg.eigh(np.array(rows))[1][:, -1].tolist()
-    return found
+    return Rotation.model_validate({"quaternion": quaternion(matrix).tolist()})
 
 
 class Hinge(Joint):
