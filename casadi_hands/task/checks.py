@@ -11,11 +11,10 @@ from casadi_hands.task.obstacles import depth_below, depth_in_palm, palm_depth_b
 from casadi_hands.task.on_joint import joint_problems
 from casadi_hands.task.problem import Problem
 from casadi_hands.task.region import Region
+from casadi_hands.task.rotation import LARGEST_TURN
 from casadi_hands.task.task import Task
 from casadi_hands.task.units import wrong_units
 
-# The exponential map of orientations is singular at 360°; beyond this turn it is too close.
-_LARGEST_TURN = 300.0
 # Depths below this share of the characteristic length are the rounding of numbers typed by hand.
 _TYPED = 1e-3
 _NAMELESS = "the name of one of object.shapes, and none has any: give it one, as in `sphere: {..., name: knob}`"
@@ -109,10 +108,8 @@ def _turns(task: Task) -> Iterator[Problem]:
     if task.object.attached is not None:  # whose turns are its joint's
         return
     for number, turn in enumerate(np.degrees(np.linalg.norm(task.goal_turns(), axis=1))):
-        if turn > _LARGEST_TURN * (1 + 1e-6):
-            allowed = (
-                f"a turn of at most ±{_LARGEST_TURN:g}° from the first goal's orientation; this one is {turn:.4g}°"
-            )
+        if turn > LARGEST_TURN * (1 + 1e-6):
+            allowed = f"a turn of at most ±{LARGEST_TURN:g}° from the first goal's orientation; this one is {turn:.4g}°"
             degrees = task.motion[number].rotation.degrees
             yield Problem(("motion", number, "rotation"), f"{degrees:.4g} degrees", allowed)
 

@@ -11,10 +11,8 @@ from casadi_hands.task.fields import refuse, vector
 from casadi_hands.task.motion import Goal
 from casadi_hands.task.object import ManipulatedObject
 from casadi_hands.task.problem import Problem
-from casadi_hands.task.rotation import rotation_matrix
+from casadi_hands.task.rotation import LARGEST_TURN, rotation_matrix
 
-FARTHEST = 300.0
-"""Degrees that a joint may turn from the first goal."""
 # Of the characteristic length, and rad: what poses typed by hand may be off their joint.
 _OFF, _TILTED = 1e-3, 1e-3
 
@@ -71,8 +69,8 @@ def joint_problems(body: ManipulatedObject, goals: tuple[Goal, ...], turns: np.n
     joint, first = body.attached.joint, goals[0]
     for number, (goal, q) in enumerate(zip(goals, coordinates(joint, goals, turns), strict=True)):
         name = "angle" if goal.on_joint else "rotation"
-        if joint.turns and abs(np.degrees(q)) > FARTHEST * (1 + 1e-6):
-            allowed = f"a turn of at most ±{FARTHEST:g}° from the first goal"
+        if joint.turns and abs(np.degrees(q)) > LARGEST_TURN * (1 + 1e-6):
+            allowed = f"a turn of at most ±{LARGEST_TURN:g}° from the first goal"
             yield Problem(("motion", number, name), f"{np.degrees(q):.4g} degrees", allowed)
         if goal.on_joint:
             continue

@@ -9,6 +9,9 @@ from pydantic import Field, model_validator
 
 from casadi_hands.task.fields import Number, Quadruple, Section, Vector, refuse
 
+LARGEST_TURN = 300.0
+"""Degrees from the first goal's orientation: the exponential map is singular at 360°, and this is near enough."""
+
 
 class _Quaternion(Section):
     quaternion: Quadruple = Field(description="[w, x, y, z], object to world; scaled to unit length.")
