@@ -15,6 +15,7 @@ from casadi_hands.diagnosis.patches import nearby
 from casadi_hands.geometry.contact_points import inward_normals
 from casadi_hands.problem.model import Model, palm_from_world
 from casadi_hands.task import Task
+from casadi_hands.task.obstacles import distance_from_disc
 
 Array = NDArray[np.float64]
 _APART = 0.75  # of a link's diameter: stages move contacts apart that overlap by less
@@ -75,10 +76,8 @@ def _depth(task: Task, model: Model, turn: Array, place: Array, point: Array, no
         depths.append((radius - (float(world[2]) - model.ground), "the ground"))
     if not task.palm.may_move:
         to_palm, palm = palm_from_world(model, 0.0)
-        x, y, z = to_palm @ (world - palm)
-        thickness = task.palm.thickness / model.units.length
-        beyond = np.array([np.hypot(x, y) - model.palm_radius, max(z, -thickness - z)])
-        distance = float(np.linalg.norm(np.maximum(beyond, 0)) + min(beyond.max(), 0))
+        seen, thickness = to_palm @ (world - palm), task.palm.thickness / model.units.length
+        distance = float(distance_from_disc(seen[None], model.palm_radius, thickness)[0])
         depths.append((radius - distance, "the palm"))
     return max(depths)
 

@@ -10,6 +10,8 @@ from casadi_hands.task.object import ManipulatedObject
 from casadi_hands.task.palm import Palm
 from casadi_hands.task.rotation import rotation_matrix
 
+_RIM = 16  # points of a rim that stand for it
+
 
 def depth_below(body: ManipulatedObject, position: np.ndarray, vector: np.ndarray, height: float) -> float:
     """Depth of the object below the level ground at ``height``, m; negative above.
@@ -59,15 +61,34 @@ def depth_in_palm(
     rotation, to_palm = rotation_matrix(vector), rotation_palm.T
 
     def distance(points: np.ndarray) -> np.ndarray:
-        """Signed distances (E,) of the disc and points (E, 3) in the palm frame, m."""
-        across, above = np.hypot(points[:, 0], points[:, 1]), points[:, 2]
-        beyond = np.stack([across - palm.radius, np.maximum(above, -palm.thickness - above)])
-        return np.asarray(np.linalg.norm(np.maximum(beyond, 0), axis=0) + np.minimum(beyond.max(axis=0), 0))
+        return distance_from_disc(points, palm.radius, palm.thickness)
 
     edges = np.concatenate([shape.edges for shape in body.shapes])
     balls = np.concatenate([np.full(len(shape.edges), shape.body.ball) for shape in body.shapes])
     starts, ends = ((position + end @ rotation.T - center) @ to_palm.T for end in edges.swapaxes(0, 1))
-    return float(np.max(balls - _least(distance, starts, ends)))
+    depth = float(np.max(balls - _least(distance, starts, ends)))
+    # Of a face that is wider than the palm no edge need be in it.
+    points = (center + _points_of_disc(palm.radius, palm.thickness) @ rotation_palm.T - position) @ rotation
+    reach = float(np.linalg.norm(points[0] - points[-1]))
+    for shape in body.shapes:
+        if reach - shape.body.signed_distance(points[0]) > depth:
+            depth = max(depth, -min(shape.body.signed_distance(point) for point in points))
+    return depth
+
+
+def distance_from_disc(points: np.ndarray, radius: float, thickness: float) -> np.ndarray:
+    """Signed distances (E,) of points (E, 3) from a disc with its face at z = 0 and its back below; any unit."""
+    across, above = np.hypot(points[:, 0], points[:, 1]), points[:, 2]
+    beyond = np.stack([across - radius, np.maximum(above, -thickness - above)])
+    return np.asarray(np.linalg.norm(np.maximum(beyond, 0), axis=0) + np.minimum(beyond.max(axis=0), 0))
+
+
+def _points_of_disc(radius: float, thickness: float) -> np.ndarray:
+    """Points (P, 3) of such a disc: its middle, then the rims of face and back."""
+    angles = 2 * np.pi * np.arange(_RIM) / _RIM
+    rim = radius * np.column_stack([np.cos(angles), np.sin(angles), 0 * angles])
+    back = np.array([0, 0, -thickness])
+    return np.vstack([back / 2, rim, rim + back])
 
 
 def _least(function: Callable[[np.ndarray], np.ndarray], start: np.ndarray, end: np.ndarray) -> np.ndarray:

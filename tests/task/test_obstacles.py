@@ -36,6 +36,28 @@ def test_clearance_of_object_and_palm_agrees_with_coal(rng: np.random.Generator)
     assert 10 < apart < 60
 
 
+WIDE = {
+    "sphere": {"center": (0, 0, 0), "radius": 0.15},
+    "cylinder": {"start": (0, 0, -0.15), "end": (0, 0, 0.15), "radius": 0.15},
+    "box": {"center": (0, 0, 0), "size": (0.3, 0.3, 0.3)},
+    "convex": {"vertices": [(x, y, z) for x in (-0.15, 0.15) for y in (-0.15, 0.15) for z in (-0.15, 0.15)]},
+}
+
+
+@pytest.mark.parametrize("kind", WIDE)
+def test_a_palm_within_a_face_or_behind_it_is_found(kind: str) -> None:
+    """A small palm below the top of a large object, off edges and diagonals of faces, level and on edge."""
+    body = ManipulatedObject.model_validate({"mass": 1, "shapes": [{kind: WIDE[kind]}]})
+    palm = Palm.model_validate({"radius": 0.02, "thickness": 0.004, "position": (0, 0, 0), "facing": (0, 0, 1)})
+    level, on_edge = np.eye(3), ScipyRotation.from_euler("x", 90, degrees=True).as_matrix()
+    for rotation, deepest in ((level, 0.004), (on_edge, 0.02)):
+        for below in (-0.01, -0.001, 0.001, 0.05, 0.15):
+            at = np.array([0.05, 0.01, 0.15 - below + deepest]) if kind != "sphere" else [0, 0, 0.15 - below + deepest]
+            depth = depth_in_palm(body, np.zeros(3), np.zeros(3), palm, (np.array(at), rotation))
+            assert (depth > 0) == (below > 0)
+            assert abs(depth) >= 0.9 * min(abs(below), 0.1)
+
+
 def test_depths_below_the_ground() -> None:
     # The capsule stands on end, its lower end at 0.1 - 0.03 - 0.01.
     upright = np.array([0, np.pi / 2, 0])
