@@ -30,11 +30,11 @@ def hull_of(points: Array) -> Hull:
     """
     found = ConvexHull(points)
     size, planes = float(np.ptp(points, axis=0).max()), found.equations
-    kept: list[Array] = []
+    faces = np.zeros((0, 4))
     for plane in planes:
-        if all(np.linalg.norm((plane - other)[:3]) > ALIKE or abs(plane - other)[3] > ALIKE * size for other in kept):
-            kept.append(plane)
-    faces = np.array(kept)
+        apart = faces - plane
+        if np.all((np.linalg.norm(apart[:, :3], axis=1) > ALIKE) | (np.abs(apart[:, 3]) > ALIKE * size)):
+            faces = np.vstack([faces, plane])
     corners = points[found.vertices]
     new = {int(old): k for k, old in enumerate(found.vertices)}
     triangles = np.array([[new[int(v)] for v in triangle] for triangle in found.simplices])
