@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -124,13 +125,14 @@ class Convex(Body):
 
     def __new__(cls, vertices: Array, edge_radius: float) -> Convex:
         """A body of as many faces and corners as its points have: a class of its own, since kernels differ by it."""
-        try:
+        hull = core = None
+        with contextlib.suppress(QhullError, ValueError):
             hull = hull_of(np.asarray(vertices, float))
-        except (QhullError, ValueError):
-            return object.__new__(cls)
-        core = within(hull, edge_radius) or hull
-        made = object.__new__(_of_counts(len(hull.normals), len(core.corners)))
-        object.__setattr__(made, "_made", (hull, core))
+            core = within(hull, edge_radius)
+        made = object.__new__(_of_counts(len(hull.normals), len(core.corners)) if hull and core else Convex)
+        # All of it here: Python calls no `__init__` of what is not of the class that was asked for.
+        for name, value in (("vertices", vertices), ("edge_radius", edge_radius), ("_made", (hull, core))):
+            object.__setattr__(made, name, value)
         return made
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -139,11 +141,10 @@ class Convex(Body):
 
     def impossible(self) -> str:
         """See `Body`."""
-        if not hasattr(self, "_made"):
+        hull, core = self._made  # type: ignore[attr-defined]
+        if hull is None:
             return "four points or more that do not lie in one plane"
-        if within(self._hull, self.edge_radius) is None:
-            return "an edge_radius smaller than half its least width"
-        return ""
+        return "" if core else "an edge_radius smaller than half its least width"
 
     @property
     def _hull(self) -> Hull:
@@ -163,10 +164,6 @@ class Convex(Body):
         """See `Body`: faces' normals and reaches, corners of the core, edge radius."""
         hull = self._hull
         return np.concatenate([hull.normals.ravel(), self._reaches, self._core.corners.ravel(), [self.edge_radius]])
-
-    def measured(self, change: Callable[[Array], Array]) -> Convex:
-        """See `Body`."""
-        return Convex(change(np.asarray(self.vertices)), float(change(np.asarray(self.edge_radius))))
 
     @classmethod
     def surface(cls, parameters: SX) -> Surface:
@@ -277,7 +274,7 @@ class Convex(Body):
 
     def placed(self, rotation: Array, position: Array) -> Convex:
         """See `Body`."""
-        return Convex(np.asarray(self.vertices) @ rotation.T + position, self.edge_radius)
+        return replace(self, vertices=np.asarray(self.vertices) @ rotation.T + position)
 
     def edges(self) -> list[tuple[Array, Array]]:
         """See `Body`."""

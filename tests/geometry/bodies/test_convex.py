@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 
 import coal
 import numpy as np
@@ -97,6 +98,12 @@ def test_it_travels() -> None:
     there = pickle.loads(pickle.dumps(PRISM))
     assert type(there) is type(PRISM)
     np.testing.assert_array_equal(there.parameters, PRISM.parameters)
+
+
+def test_what_has_other_counts_is_of_another_class() -> None:
+    other = replace(SAME, vertices=WEDGE.vertices)
+    assert type(other) is type(WEDGE) is not type(SAME)
+    np.testing.assert_array_equal(other.parameters, WEDGE.parameters)
 
 
 def test_a_task_file_gives_a_polytope() -> None:
