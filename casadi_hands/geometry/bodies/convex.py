@@ -108,11 +108,14 @@ def _edge(data: Mapping[str, Any]) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Convex(Body):
-    """The least polytope about some points."""
+    """The least polytope about some points.
+
+    Attributes:
+        counts: of faces, and of corners of the core; like ``width``, classes that `_of_counts` makes have it.
+    """
 
     kind: ClassVar[str] = "convex"
-    width: ClassVar[int] = 10_000  # of one with as many faces and corners as are allowed
-    counts: ClassVar[tuple[int, int]] = (0, 0)
+    counts: ClassVar[tuple[int, int]]
     vertices: Array = field(metadata={"about": "Its corners, m, object frame; a list of four or more.", "is": "points"})
     edge_radius: float = field(
         metadata={
