@@ -7,6 +7,7 @@ from typing import Any, Self
 import numpy as np
 from pydantic import Field, ValidationError, field_validator, model_validator
 
+from casadi_hands.geometry.bodies.body import farthest
 from casadi_hands.task.attached import Attached
 from casadi_hands.task.fields import Matrix, Positive, Section, Vector, follows, refuse, vector
 from casadi_hands.task.mesh import Mesh, MeshRecord, Uniform
@@ -130,7 +131,5 @@ class ManipulatedObject(Section):
         """
         down = rotation.T @ np.array([0.0, 0.0, -1.0])
         points = np.vstack([s.body.support(down) + s.body.ball * down for s in self.shapes])
-        depths = points @ down
-        lowest = points[depths >= depths.max() - 1e-9 * self.characteristic_length]
-        middle: np.ndarray = lowest.mean(axis=0)
+        middle: np.ndarray = farthest(points, down, self.characteristic_length).mean(axis=0)
         return middle

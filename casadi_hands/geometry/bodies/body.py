@@ -7,7 +7,7 @@ A class that leaves something out cannot be made: Python's ``TypeError`` names w
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, ClassVar, Literal
 
@@ -218,6 +218,24 @@ class Body(ABC):
         """Lower and upper corner, (3,) and (3,)."""
         most = [np.array([self.support(sign * e)[0] @ e for e in np.eye(3)]) + sign * self.ball for sign in (-1, 1)]
         return most[0], most[1]
+
+
+def edge_metadata(default: Callable[[Mapping[str, Any]], float], text: str, edges: str = "the edges") -> dict[str, Any]:
+    """Of the field with the radius of a body's rounded edges.
+
+    Args:
+        default: of other fields, as a task file gives them, the radius where none is given, m.
+        text: what that is, in words.
+        edges: which have the radius.
+    """
+    about = f"Radius of {edges}, m, as the motion sees them; files have them sharp."
+    return {"about": about, "is": "positive", "default": default, "default_text": text}
+
+
+def farthest(points: Array, direction: Array, size: float) -> Array:
+    """Those of points (N, 3) that are farthest in a direction (3,), to the rounding of lengths of a size."""
+    heights = points @ direction
+    return np.asarray(points[heights >= heights.max() - 1e-9 * size])
 
 
 def surfaces(kinds: tuple[type[Body], ...], parameters: SX) -> list[Surface]:

@@ -12,7 +12,7 @@ import numpy as np
 from casadi import SX
 from scipy.spatial.transform import Rotation
 
-from casadi_hands.geometry.bodies.body import Array, Body, Core, Solid, Surface
+from casadi_hands.geometry.bodies.body import Array, Body, Core, Solid, Surface, edge_metadata, farthest
 from casadi_hands.geometry.smooth import norm
 
 _KINK = 1e-3  # rounding of corners, a share of the half sides, and lengths
@@ -89,14 +89,7 @@ class Box(Body):
             "is": "rotation",
         }
     )
-    edge_radius: float = field(
-        metadata={
-            "about": "Radius of the edges, m, as the motion sees them; files have them sharp.",
-            "is": "positive",
-            "default": _edge,
-            "default_text": "a fortieth of half the shortest side",
-        }
-    )
+    edge_radius: float = field(metadata=edge_metadata(_edge, "a fortieth of half the shortest side"))
 
     def impossible(self) -> str:
         """See `Body`."""
@@ -169,9 +162,7 @@ class Box(Body):
 
     def support(self, direction: Array) -> Array:
         """See `Body`."""
-        corners = self._corners
-        heights = corners @ direction
-        return np.asarray(corners[heights >= heights.max() - 1e-9 * max(self.size)])
+        return farthest(self._corners, direction, max(self.size))
 
     @property
     def _corners(self) -> Array:

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from casadi_hands.geometry.bodies.body import Array, Body, Core, Solid, Surface
+from casadi_hands.geometry.bodies.body import Array, Body, Core, Solid, Surface, farthest
 from casadi_hands.geometry.smooth import norm
 
 # The normal turns a corner where cap and cylinder meet, and contacts like to sit there: an optimiser jams on it. The
@@ -93,9 +93,7 @@ class Capsule(Body):
 
     def support(self, direction: Array) -> Array:
         """See `Body`: one end, or both where the axis is across the direction."""
-        ends = np.array([self.start, self.end])
-        heights = ends @ direction
-        return np.asarray(ends[heights >= heights.max() - 1e-9 * self._size])
+        return farthest(np.array([self.start, self.end]), direction, self._size)
 
     @property
     def _length(self) -> float:

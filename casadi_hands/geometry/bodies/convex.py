@@ -14,7 +14,7 @@ import numpy as np
 from casadi import SX
 from scipy.spatial import QhullError
 
-from casadi_hands.geometry.bodies.body import Array, Body, Core, Solid, Surface
+from casadi_hands.geometry.bodies.body import Array, Body, Core, Solid, Surface, edge_metadata, farthest
 from casadi_hands.geometry.hull import ALIKE, Hull, crossed, hull_of, within
 from casadi_hands.geometry.smooth import constant, norm
 
@@ -117,14 +117,7 @@ class Convex(Body):
     kind: ClassVar[str] = "convex"
     counts: ClassVar[tuple[int, int]]
     vertices: Array = field(metadata={"about": "Its corners, m, object frame; a list of four or more.", "is": "points"})
-    edge_radius: float = field(
-        metadata={
-            "about": "Radius of square edges, m, as the motion sees them; files have them sharp.",
-            "is": "positive",
-            "default": _edge,
-            "default_text": "a hundredth of half the least width",
-        }
-    )
+    edge_radius: float = field(metadata=edge_metadata(_edge, "a hundredth of half the least width", "square edges"))
 
     def __new__(cls, vertices: Array, edge_radius: float) -> Convex:
         """A body of as many faces and corners as its points have: a class of its own, since kernels differ by it."""
@@ -244,8 +237,7 @@ class Convex(Body):
     def support(self, direction: Array) -> Array:
         """See `Body`."""
         corners = self._core.corners
-        heights = corners @ direction
-        return np.asarray(corners[heights >= heights.max() - 1e-9 * np.ptp(corners, axis=0).max()])
+        return farthest(corners, direction, float(np.ptp(corners, axis=0).max()))
 
     @property
     def _tetrahedra(self) -> tuple[Array, Array, Array]:

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from casadi_hands.geometry.bodies.body import Array, Body, Core, Solid, Surface
+from casadi_hands.geometry.bodies.body import Array, Body, Core, Solid, Surface, edge_metadata, farthest
 from casadi_hands.geometry.smooth import norm
 
 _KINK = 1e-3  # rounding of corners, a share of the length along the axis and lengths across it
@@ -81,12 +81,7 @@ class Cylinder(Body):
     end: Array = field(metadata={"about": "Middle of the other face, m, object frame.", "is": "point"})
     radius: float = field(metadata={"about": "Radius, m.", "is": "positive"})
     edge_radius: float = field(
-        metadata={
-            "about": "Radius of the edges, m, as the motion sees them; files have them sharp.",
-            "is": "positive",
-            "default": _edge,
-            "default_text": "a twentieth of the radius or of half the length, whichever is smaller",
-        }
+        metadata=edge_metadata(_edge, "a twentieth of the radius or of half the length, whichever is smaller")
     )
 
     def impossible(self) -> str:
@@ -167,8 +162,7 @@ class Cylinder(Body):
         across = direction - (direction @ axis) * axis
         far = float(np.linalg.norm(across))
         rim = (self.radius - self.edge_radius) * across / far if far > 1e-9 else np.zeros(3)
-        heights = ends @ direction
-        return np.asarray(ends[heights >= heights.max() - 1e-9 * self._length] + rim)
+        return farthest(ends, direction, self._length) + rim
 
     @property
     def volume(self) -> float:
