@@ -1,4 +1,4 @@
-"""A triangle mesh, and the mass properties of the solid that it bounds."""
+"""A triangle mesh, and its unit."""
 
 from __future__ import annotations
 
@@ -61,30 +61,6 @@ def scaled(mesh: Mesh, scale: float) -> Mesh:
         likely = "is it in metres? `scale: 1`" if scale == 0.001 else f"is `scale: {scale:g}` right?"
         raise MeshError(f"a mesh {1e3 * longest:.3g} mm long", f"at least {1e3 * SHORTEST:g} mm; {likely}")
     return Mesh(vertices, mesh.faces)
-
-
-def mass_properties(mesh: Mesh, mass: float) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """Mass properties of the solid, of one density.
-
-    The integrals over tetrahedra that each face spans with one point, exact for polyhedra (Tonon 2004).
-
-    Args:
-        mesh: closed, m.
-        mass: kg.
-
-    Returns:
-        Centre of mass (3,), m; inertia (3, 3) about it, kg·m², axes of the mesh; volume, m³.
-    """
-    origin = mesh.vertices.mean(axis=0)
-    corners = mesh.corners - origin
-    volumes = _signed_volumes(corners)
-    volume = float(volumes.sum())
-    sums = corners.sum(axis=1)
-    center = (volumes[:, None] * sums).sum(axis=0) / (4 * volume)
-    # ∫ x xᵀ over a tetrahedron with a corner at the origin: V/20 (Σ aᵢ aᵢᵀ + s sᵀ).
-    second = np.einsum("f,fki,fkj->ij", volumes, corners, corners) + np.einsum("f,fi,fj->ij", volumes, sums, sums)
-    spread = mass / volume * second / 20 - mass * np.outer(center, center)
-    return origin + center, np.trace(spread) * np.eye(3) - spread, volume
 
 
 def _signed_volumes(corners: NDArray[np.float64]) -> NDArray[np.float64]:

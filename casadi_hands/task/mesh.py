@@ -12,7 +12,8 @@ from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 from pydantic_core import PydanticCustomError
 
 from casadi_hands.errors import MeshError
-from casadi_hands.meshes import Decomposition, convex_parts, mass_properties, mend, read_mesh, scaled, told
+from casadi_hands.geometry.hull import mass_moments
+from casadi_hands.meshes import Decomposition, convex_parts, mend, read_mesh, scaled, told
 from casadi_hands.task.fields import NonNegative, Positive, Section, Whole
 
 MOST_PARTS = 64
@@ -68,8 +69,7 @@ class Mesh(Section):
             raise PydanticCustomError(
                 "refused", "{allowed}", {"allowed": error.allowed, "given": error.given}
             ) from None
-        center, inertia, volume = mass_properties(mesh, 1.0)
-        self._solid = Uniform(volume, center, inertia)
+        self._solid = Uniform(*mass_moments(mesh.corners))
         return self
 
     @property

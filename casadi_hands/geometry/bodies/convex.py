@@ -15,7 +15,7 @@ from casadi import SX
 from scipy.spatial import QhullError
 
 from casadi_hands.geometry.bodies.body import Array, Body, Core, Solid, Surface, edge_metadata, farthest
-from casadi_hands.geometry.hull import ALIKE, Hull, crossed, hull_of, within
+from casadi_hands.geometry.hull import ALIKE, Hull, crossed, hull_of, mass_moments, within
 from casadi_hands.geometry.smooth import constant, norm
 
 # The surface is where log Σ exp β(n·x - d) vanishes; with this β times its edges' radius, square edges are as far
@@ -239,33 +239,24 @@ class Convex(Body):
         corners = self._core.corners
         return farthest(corners, direction, float(np.ptp(corners, axis=0).max()))
 
-    @property
-    def _tetrahedra(self) -> tuple[Array, Array, Array]:
-        """Corners (T, 3, 3) of its triangles from a point (3,) inside, and volumes (T,) from there."""
-        inside = self._hull.corners.mean(axis=0)
-        arms = self._hull.corners[self._hull.triangles] - inside
-        return arms, inside, np.linalg.det(arms) / 6
+    @cached_property
+    def _moments(self) -> tuple[float, Array, Array]:
+        return mass_moments(self._hull.corners[self._hull.triangles])
 
     @property
     def volume(self) -> float:
         """See `Body`; of the faces' polytope, as what follows."""
-        return float(self._tetrahedra[2].sum())
+        return self._moments[0]
 
     @property
     def centroid(self) -> Array:
         """See `Body`."""
-        arms, inside, parts = self._tetrahedra
-        return np.asarray(inside + parts @ arms.sum(axis=1) / 4 / parts.sum())
+        return self._moments[1]
 
     @property
     def unit_inertia(self) -> Array:
-        """See `Body`: of tetrahedra, whose second moments are those of their corners and their middle."""
-        arms, inside, volumes = self._tetrahedra
-        whole = arms.sum(axis=1)
-        second = np.einsum("t,tki,tkj->ij", volumes, arms, arms) + np.einsum("t,ti,tj->ij", volumes, whole, whole)
-        middle = self.centroid - inside
-        moments = second / 20 / volumes.sum() - np.outer(middle, middle)
-        return np.asarray(np.trace(moments) * np.eye(3) - moments)
+        """See `Body`."""
+        return self._moments[2]
 
     def placed(self, rotation: Array, position: Array) -> Convex:
         """See `Body`."""
