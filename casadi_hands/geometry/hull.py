@@ -38,9 +38,13 @@ def hull_of(points: Array) -> Hull:
     corners = points[found.vertices]
     new = {int(old): k for k, old in enumerate(found.vertices)}
     triangles = np.array([[new[int(v)] for v in triangle] for triangle in found.simplices])
-    inward = np.einsum("ti,ti->t", crossed(corners[triangles]), planes[:, :3]) < 0
-    triangles[inward] = triangles[inward][:, ::-1]
-    return Hull(faces[:, :3], -faces[:, 3], corners, triangles)
+    return Hull(faces[:, :3], -faces[:, 3], corners, turned_outward(triangles, corners, planes[:, :3]))
+
+
+def turned_outward(triangles: NDArray[np.int_], corners: Array, normals: Array) -> NDArray[np.int_]:
+    """Triangles (T, 3) of corners (V, 3), counterclockwise seen from where their outward normals (T, 3) point to."""
+    inward = np.einsum("ti,ti->t", crossed(corners[triangles]), normals) < 0
+    return np.where(inward[:, None], triangles[:, ::-1], triangles)
 
 
 def crossed(triangles: Array) -> Array:

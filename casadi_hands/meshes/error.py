@@ -8,6 +8,7 @@ import coal
 import numpy as np
 from numpy.typing import NDArray
 
+from casadi_hands.geometry.hull import crossed
 from casadi_hands.meshes.mesh import Mesh
 from casadi_hands.meshes.winding import surface_points, winding_numbers
 
@@ -75,10 +76,11 @@ def surface_distance(mesh: Mesh, points: NDArray[np.float64]) -> NDArray[np.floa
 
 def _beyond_planes(part: Mesh, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """(N,) largest signed distance of points from the planes of a convex part's faces."""
-    a, b, c = (part.corners[:, k] for k in range(3))
-    normals = np.cross(b - a, c - a)
+    normals = crossed(part.corners)
     lengths = np.linalg.norm(normals, axis=1)
     proper = lengths > 1e-12 * lengths.max()
     normals = normals[proper] / lengths[proper, None]
-    most: NDArray[np.float64] = (points @ normals.T - np.einsum("fi,fi->f", normals, a[proper])).max(axis=1)
+    most: NDArray[np.float64] = (points @ normals.T - np.einsum("fi,fi->f", normals, part.corners[proper, 0])).max(
+        axis=1
+    )
     return most

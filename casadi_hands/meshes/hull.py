@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from casadi_hands.errors import MeshError
+from casadi_hands.geometry.hull import turned_outward
 from casadi_hands.meshes.mesh import Mesh
 
 MOST_VERTICES = 32
@@ -22,11 +23,7 @@ def hull(points: NDArray[np.float64]) -> Mesh:
     kept = np.sort(found.vertices)
     number = np.zeros(len(points), dtype=np.int64)
     number[kept] = np.arange(len(kept))
-    faces = number[found.simplices]
-    corners = points[kept][faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    inward = np.einsum("fi,fi->f", normals, found.equations[:, :3]) < 0
-    faces[inward] = faces[inward][:, ::-1]
+    faces = turned_outward(number[found.simplices], points[kept], found.equations[:, :3])
     faces = np.array([np.roll(face, -int(face.argmin())) for face in faces])
     return Mesh(points[kept], faces[np.lexsort(faces.T[::-1])])
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from casadi_hands.geometry.hull import crossed
 from casadi_hands.meshes.mesh import Mesh
 
 _AT_ONCE = 50_000  # points × faces: what a processor's cache holds
@@ -43,7 +44,7 @@ def surface_points(mesh: Mesh, count: int) -> tuple[NDArray[np.float64], NDArray
     """Points (N, 3) spread evenly over a surface, one draw a share of its area, and its normals there (N, 3)."""
     random = np.random.default_rng(0)
     a, b, c = (mesh.corners[:, k] for k in range(3))
-    across = np.cross(b - a, c - a)
+    across = crossed(mesh.corners)
     doubled = np.linalg.norm(across, axis=1)
     upto = np.cumsum(doubled)
     chosen = np.searchsorted(upto, (np.arange(count) + random.random(count)) / count * upto[-1], side="right")
