@@ -1,4 +1,4 @@
-"""Polytopes: coal and trimesh measure the sharp one; symbols against numbers; mass properties by coal; task files."""
+"""Polytopes: coal measures the sharp one; symbols against numbers; mass properties by coal; task files."""
 
 from __future__ import annotations
 
@@ -9,13 +9,10 @@ import coal
 import numpy as np
 import pytest
 
-from casadi_hands.errors import TaskError
 from casadi_hands.geometry.bodies import KINDS
 from casadi_hands.geometry.bodies.box import Box
 from casadi_hands.geometry.bodies.convex import Convex
-from casadi_hands.task import parse_task
 from tests.geometry.bodies import checks
-from tests.stages.synthesis.example import BALL
 
 CRATE = Box(np.array([0.1, -0.2, 0.3]), np.array([0.8, 1.4, 2.0]), np.array([0.3, -0.5, 0.9]), 0.01)
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * CRATE.size / 2
@@ -43,23 +40,20 @@ def test_a_box_is_a_box(rng: np.random.Generator) -> None:
 @pytest.mark.parametrize("body", [SAME, WEDGE, PRISM], ids=["box", "wedge", "prism"])
 def test_its_surface_is_next_to_the_sharp_one(body: Convex, rng: np.random.Generator) -> None:
     """Coal measures how far points of the surface are from the polytope: along edges within it, at faces on it."""
-    hull = coal.Convex.convexHull(_points(np.asarray(body.vertices)), True, "Qt")
     off = []
     for point in checks.around(body, rng, 200):
         on = body.on_surface(point)
         assert body.signed_distance(on) == pytest.approx(0, abs=1e-9)
-        tiny = coal.Sphere(1e-9), coal.Transform3s(np.eye(3), on)
-        request, result = coal.DistanceRequest(), coal.DistanceResult()
-        off.append(coal.distance(hull, coal.Transform3s.Identity(), *tiny, request, result))
+        off.append(checks.coal_distance(_hull(body), (coal.Sphere(1e-9), coal.Transform3s(np.eye(3), on))))
     assert min(off) > -0.02
     assert max(off) < 5e-3
     assert np.median(np.abs(off)) < 4e-3
 
 
-def _points(vertices: np.ndarray) -> coal.StdVec_Vec3s:
+def _hull(body: Convex) -> checks.Placed:
     points = coal.StdVec_Vec3s()
-    points.extend(list(vertices))
-    return points
+    points.extend(list(np.asarray(body.vertices)))
+    return coal.Convex.convexHull(points, True, "Qt"), coal.Transform3s.Identity()
 
 
 @pytest.mark.parametrize("body", [SAME, WEDGE, PRISM], ids=["box", "wedge", "prism"])
@@ -80,18 +74,13 @@ def test_derivatives_are_finite_anywhere() -> None:
 
 
 def test_mass_properties_are_those_of_coal() -> None:
-    hull = coal.Convex.convexHull(_points(np.asarray(WEDGE.vertices)), True, "Qt")
-    assert WEDGE.volume == pytest.approx(hull.computeVolume())
-    np.testing.assert_allclose(WEDGE.centroid, hull.computeCOM(), atol=1e-9)
-    expected = hull.computeMomentofInertiaRelatedToCOM() / hull.computeVolume()
-    np.testing.assert_allclose(WEDGE.unit_inertia, expected, atol=1e-9)
+    checks.check_solid(WEDGE, _hull(WEDGE))
 
 
 @pytest.mark.parametrize("body", [SAME, PRISM], ids=["box", "prism"])
 def test_the_distance_of_a_link_is_that_of_coal(body: Convex, rng: np.random.Generator) -> None:
     """Near the surface; farther off beside edges it is too small."""
-    hull = coal.Convex.convexHull(_points(np.asarray(body.vertices)), True, "Qt")
-    checks.check_links(body, (hull, coal.Transform3s.Identity()), rng, near=0.1, short=0.05, swept=body.ball)
+    checks.check_links(body, _hull(body), rng, near=0.1, short=0.05, swept=body.ball)
 
 
 def test_it_travels() -> None:
@@ -107,18 +96,14 @@ def test_what_has_other_counts_is_of_another_class() -> None:
 
 
 def test_a_task_file_gives_a_polytope() -> None:
-    ball = "sphere: {center: [0, 0, 0], radius: 0.03}"
     points = [[x, y, z] for x in (-0.02, 0.02) for y in (-0.03, 0.03) for z in (-0.03, 0.03)]
-    given = f"convex: {{vertices: {points}}}"
-    (shape,) = parse_task(BALL.replace(ball, given)).object.shapes
+    flat = [[x, y, 0.0] for x, y, _ in points]
+    refused = {
+        f"convex: {{vertices: {flat}}}": "four points or more that do not lie in one plane",
+        f"convex: {{vertices: {points[:3]}}}": "4",
+        f"convex: {{vertices: {points}, edge_radius: 0.02}}": "an edge_radius smaller than half its least width",
+    }
+    shape = checks.shape_in_task(f"convex: {{vertices: {points}}}", refused)
     assert isinstance(shape.body, KINDS["convex"])
     assert shape.body.counts == (6, 8)
     assert shape.edge_radius == pytest.approx(0.0002)
-    flat = [[x, y, 0.0] for x, y, _ in points]
-    for wrong, allowed in (
-        (f"convex: {{vertices: {flat}}}", "four points or more that do not lie in one plane"),
-        (f"convex: {{vertices: {points[:3]}}}", "4"),
-        (f"convex: {{vertices: {points}, edge_radius: 0.02}}", "an edge_radius smaller than half its least width"),
-    ):
-        with pytest.raises(TaskError, match=allowed):
-            parse_task(BALL.replace(ball, wrong))
