@@ -62,7 +62,9 @@ def _snap(point: Vector, body: ManipulatedObject, path: tuple[str, ...], problem
         problems.append(Problem(path, given, allowed))
         return point
     if not shape.body.has_normal(start):
-        problems.append(Problem(path, given, "a point off the axis of its primitive, so that one side is nearest"))
+        problems.append(
+            Problem(path, given, "a point off the axis or middle of its primitive, so that one side is nearest")
+        )
         return point
     snapped = start if distance <= _ROUNDING * size else shape.body.on_surface(start)
     for number, other in enumerate(body.shapes):

@@ -628,7 +628,7 @@ def test_drawing_goal_under_the_ground() -> None:
 def test_contact_on_an_axis() -> None:
     thin = GOOD.replace("radius: 0.02", "radius: 0.002").replace("-0.02, 0.02", "-0.002, 0.02")
     assert message(thin.replace("[0, 0.02, -0.01]", "[0, 0, -0.01]")) == (
-        "wrong.yaml:15: fingers.thumb.touches: given [0.0, 0.0, -0.01]; allowed: a point off the axis of its "
+        "wrong.yaml:15: fingers.thumb.touches: given [0.0, 0.0, -0.01]; allowed: a point off the axis or middle of its "
         "primitive, so that one side is nearest"
     )
 

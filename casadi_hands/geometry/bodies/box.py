@@ -143,7 +143,8 @@ class Box(Body):
         """See `Body`."""
         _, beyond = self._local(point)
         first, second = np.sort(beyond)[:-3:-1]
-        return bool(first > 0 or first - second > 1e-6 * min(self.size))
+        middle = self._half[np.argmax(beyond)] - self.edge_radius  # as far from the face on the other side
+        return bool(first > 0 or min(first - second, first + middle) > 1e-6 * min(self.size))
 
     def outward(self, point: Array) -> Array:
         """See `Body`; within the core, out of its nearest face."""

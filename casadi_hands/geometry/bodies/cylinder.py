@@ -136,7 +136,10 @@ class Cylinder(Body):
     def has_normal(self, point: Array) -> bool:
         """See `Body`."""
         above, beyond, _ = self._outside(point)
-        return max(above, beyond) > 0 or abs(above - beyond) > 1e-6 * self.radius
+        # From there both faces are as near, or the side all around.
+        middle = self._length / 2 - self.edge_radius if above > beyond else self.radius - self.edge_radius
+        off = min(abs(above - beyond), max(above, beyond) + middle)
+        return max(above, beyond) > 0 or off > 1e-6 * self.radius
 
     def outward(self, point: Array) -> Array:
         """See `Body`; within the core, out of its nearest face."""

@@ -68,6 +68,14 @@ def test_farthest_points_are_those_of_its_corners(rng: np.random.Generator) -> N
     checks.check_edges(CRATE, rng)
 
 
+def test_where_two_faces_are_as_near_there_is_no_normal() -> None:
+    flat = Box(np.zeros(3), np.array([1.0, 1.0, 0.2]), np.zeros(3), 0.01)
+    assert not flat.has_normal(np.array([0.2, 0, 0]))
+    assert not flat.has_normal(np.array([0.43, 0, 0.03]))
+    for point in ([0.2, 0, 1e-3], [0.45, 0, 0], [0.9, 0, 0]):
+        assert flat.has_normal(np.array(point))
+
+
 def test_mass_properties_are_those_of_coal() -> None:
     checks.check_solid(CRATE, (coal.Box(*CRATE.size), coal.Transform3s(CRATE.turn, CRATE.center)))
 

@@ -54,8 +54,17 @@ def test_a_point_is_moved_onto_the_surface_along_its_normal(rng: np.random.Gener
         on = CAN.on_surface(point)
         assert CAN.signed_distance(on) == pytest.approx(0, abs=1e-12)
         assert np.linalg.norm(on - point) == pytest.approx(abs(CAN.signed_distance(point)))
-    middle = (CAN.start + CAN.end) / 2
-    assert not CAN.has_normal(middle + (CAN.radius - 0.6) * CAN.helper) or CAN.has_normal(CAN.start)
+
+
+def test_where_two_sides_are_as_near_there_is_no_normal() -> None:
+    """On the axis of a long one, half way between the faces of a flat one, and where face and side are as near."""
+    flat = Cylinder(np.array([0, 0, -0.1]), np.array([0, 0, 0.1]), 0.5, 0.01)
+    assert not CAN.has_normal(CAN.centroid + 0.1 * CAN.helper)
+    assert not flat.has_normal(np.array([0.2, 0, 0]))
+    assert not flat.has_normal(np.array([0.43, 0, 0.03]))
+    for body, point in ((CAN, CAN.start), (flat, [0.2, 0, 1e-3]), (flat, [0.45, 0, 0]), (flat, [0.9, 0, 0])):
+        assert body.has_normal(np.array(point))
+        assert np.linalg.norm(body.outward(np.array(point))) == pytest.approx(1)
 
 
 def test_its_farthest_points_are_those_of_many_on_its_surface(rng: np.random.Generator) -> None:
