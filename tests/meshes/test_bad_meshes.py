@@ -436,7 +436,6 @@ PLACES: dict[str, tuple[Callable[[Path], object], str]] = {
 }
 
 
-@pytest.mark.skipif(os.name == "nt", reason="no pipes and devices by name")
 @pytest.mark.parametrize("case", PLACES)
 def test_only_files_are_read(case: str, tmp_path: Path) -> None:
     make, message = PLACES[case]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -84,12 +86,30 @@ def test_a_name_is_made_of_any_files(tmp_path: Path) -> None:
     assert load_task(file).name == "a_[31m_"
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
-def test_no_permission(tmp_path: Path) -> None:
-    file = tmp_path / "locked.yaml"
-    file.write_text(HEAD)
-    file.chmod(0)
-    assert "locked.yaml: cannot be read: Permission denied" in message(file)
+@contextmanager
+def without_privileges() -> Iterator[None]:
+    """As a user from whom files can be kept: where root runs the tests, as nobody for as long."""
+    root = os.geteuid() == 0
+    if root:
+        os.seteuid(65534)
+    try:
+        yield
+    finally:
+        if root:
+            os.seteuid(0)
+
+
+def test_no_permission(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # By a name in the working folder: the folders above it may be kept from others, too.
+    tmp_path.chmod(0o755)
+    monkeypatch.chdir(tmp_path)
+    for name, mode in (("open.yaml", 0o644), ("locked.yaml", 0)):
+        Path(name).write_text(HEAD)
+        Path(name).chmod(mode)
+    load_task("open.yaml")  # modules that it imports may be kept from others, too
+    with without_privileges():
+        assert load_task("open.yaml").name == "open"
+        assert message("locked.yaml").startswith("locked.yaml: cannot be read: Permission denied")
 
 
 def test_links_in_a_circle(tmp_path: Path) -> None:
