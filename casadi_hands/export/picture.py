@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from casadi_hands.export.markup import GROUND_COLOR, Color
-from casadi_hands.export.meshes import mesh_path, polytopes
-from casadi_hands.export.page.robot import Robot, Shape
+from casadi_hands.export.page.robot import Robot, Shape, object_robot
 from casadi_hands.export.page.scene import eye_towards
 from casadi_hands.export.page.timeline import design_timeline
 from casadi_hands.export.page.unsolved import bare_palm
-from casadi_hands.export.urdf import hand_urdf, object_urdf
+from casadi_hands.export.urdf import hand_urdf
 from casadi_hands.problem.result import Result
 
 Array = NDArray[np.float64]
@@ -51,8 +50,7 @@ def picture(design: Result, width: int = 320) -> str:
         width: of the picture, px; as high as wide.
     """
     task = design.task
-    meshes = {mesh_path(name): (solid.vertices, solid.triangles) for name, solid in polytopes(task).items()}
-    hand, item = Robot(hand_urdf(design.hand or bare_palm(design))), Robot(object_urdf(task), meshes)
+    hand, item = Robot(hand_urdf(design.hand or bare_palm(design))), object_robot(task)
     timeline = design_timeline(design, hand)
     eye = _frame(eye_towards(task.palm.rotation[:, 2]))
     palm, body = timeline.palm[0], timeline.object[0]

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 
 from casadi_hands.export.markup import GROUND_COLOR, Color, finger_color
-from casadi_hands.export.meshes import mesh_path, polytopes
-from casadi_hands.export.page.robot import Robot, Shape
+from casadi_hands.export.page.robot import Robot, Shape, object_robot
 from casadi_hands.export.page.scene import GOAL_COLOR
-from casadi_hands.export.page.shapes import faceted, patched_box, patched_cylinder, patched_sphere
-from casadi_hands.export.urdf import hand_urdf, object_urdf
+from casadi_hands.export.page.shapes import two_toned
+from casadi_hands.export.urdf import hand_urdf
 from casadi_hands.motion.quaternion import quaternion
 from casadi_hands.problem.result import Result
 from casadi_hands.studio.animation import OBJECT, Animation, animation_of
@@ -43,7 +42,7 @@ class TaskDrawing:
         for node in self._nodes.values():
             node.remove()
         self._nodes = {}
-        item, size = _object_of(task), task.object.characteristic_length
+        item, size = object_robot(task), task.object.characteristic_length
         for each in places(task):
             node = self._scene.add_frame(
                 f"{TASK}/{'_'.join(map(str, each.path))}",
@@ -146,7 +145,7 @@ class ResultDrawing:
             return False
         for frame in self._frames:
             frame.remove()
-        hand, item = Robot(hand_urdf(design.hand)), _object_of(design.task)
+        hand, item = Robot(hand_urdf(design.hand)), object_robot(design.task)
         self._animation = animation_of(design, hand)
         self._frames = [self._scene.add_frame(f"{RESULT}/{name}", show_axes=False) for name in self._animation.names]
         for k, shape in enumerate(hand.shapes):
@@ -166,32 +165,17 @@ class ResultDrawing:
                 frame.position, frame.wxyz = position, wxyz
 
 
-def _object_of(task: Task) -> Robot:
-    meshes = {mesh_path(name): (solid.vertices, solid.triangles) for name, solid in polytopes(task).items()}
-    return Robot(object_urdf(task), meshes)
-
-
 def _add_shape(scene: Any, name: str, shape: Shape, solid: bool) -> Any:
     """A shape of the object: in two tones, or as the ghost of a goal."""
     if not solid:
-        return _add_plain(scene, name, shape.shrunk(0.985), GOAL_COLOR, 0.25)
+        return _add_plain(scene, name, shape.thinner, GOAL_COLOR, 0.25)
     import trimesh
 
-    pale: Color = tuple(0.25 * part + 0.75 for part in shape.color)  # type: ignore[assignment]
-    tones = (shape.color, pale)
-    if shape.mesh is not None:
-        mesh = faceted(*shape.mesh, tones)
-    elif shape.sides is not None:
-        mesh = patched_box(shape.sides, tones)
-    elif shape.length is None:
-        mesh = patched_sphere(shape.radius, tones)
-    else:
-        mesh = patched_cylinder(shape.radius, shape.length, tones)
-    normals = getattr(mesh, "normals", None)
+    mesh = two_toned(shape)
     solid_mesh = trimesh.Trimesh(
         mesh.vertices,
         mesh.faces,
-        vertex_normals=normals,
+        vertex_normals=mesh.normals,
         vertex_colors=np.round(255 * mesh.color**_GAMMA).astype(np.uint8),
         process=False,
     )

@@ -4,11 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
+
+from casadi_hands.export.meshes import mesh_path, polytopes
+from casadi_hands.export.urdf import object_urdf
+
+if TYPE_CHECKING:
+    from casadi_hands.task import Task
+
+_THINNER = 0.985  # share of its size that a goal's ghost is drawn with
 
 
 @dataclass(frozen=True)
@@ -33,11 +41,12 @@ class Shape:
     sides: tuple[float, float, float] | None = None
     mesh: tuple[np.ndarray, np.ndarray] | None = None
 
-    def shrunk(self, share: float) -> Shape:
-        """The same about its middle, a share as thick; a cylinder as long."""
-        sides = self.sides and (share * self.sides[0], share * self.sides[1], share * self.sides[2])
-        mesh = None if self.mesh is None else (share * self.mesh[0], self.mesh[1])
-        return replace(self, radius=share * self.radius, sides=sides, mesh=mesh)
+    @property
+    def thinner(self) -> Shape:
+        """The same about its middle, a little thinner (a cylinder as long): a ghost that the shape in it hides."""
+        sides = self.sides and (_THINNER * self.sides[0], _THINNER * self.sides[1], _THINNER * self.sides[2])
+        mesh = None if self.mesh is None else (_THINNER * self.mesh[0], self.mesh[1])
+        return replace(self, radius=_THINNER * self.radius, sides=sides, mesh=mesh)
 
     @property
     def reach(self) -> float:
@@ -100,6 +109,12 @@ class Robot:
         half_length = getattr(item.geometry, "halfLength", None)
         length = None if half_length is None else 2 * float(half_length)
         return Shape(str(frame.name), placement, float(item.geometry.radius), length, (red, green, blue))
+
+
+def object_robot(task: Task) -> Robot:
+    """The object as it is exported."""
+    meshes = {mesh_path(name): (solid.vertices, solid.triangles) for name, solid in polytopes(task).items()}
+    return Robot(object_urdf(task), meshes)
 
 
 def _without_meshes(urdf: str, meshes: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> tuple[str, list[Shape]]:

@@ -22,22 +22,13 @@ from meshcat.geometry import (
 )
 
 from casadi_hands.export.markup import GROUND_COLOR, finger_color
-from casadi_hands.export.meshes import mesh_path, polytopes
 from casadi_hands.export.page.recorder import recording
-from casadi_hands.export.page.robot import Robot, Shape
-from casadi_hands.export.page.shapes import (
-    Color,
-    FineSphere,
-    LayeredMesh,
-    faceted,
-    patched_box,
-    patched_cylinder,
-    patched_sphere,
-)
+from casadi_hands.export.page.robot import Robot, Shape, object_robot
+from casadi_hands.export.page.shapes import Color, FineSphere, LayeredMesh, two_toned
 from casadi_hands.export.page.timeline import Timeline, design_timeline, goal_poses, poses
 from casadi_hands.export.page.tracks import Tracks
 from casadi_hands.export.page.unsolved import Label, bare_palm, distinct_goals, goal_labels, steps
-from casadi_hands.export.urdf import hand_urdf, object_urdf
+from casadi_hands.export.urdf import hand_urdf
 
 if TYPE_CHECKING:
     from casadi_hands.problem.motion import Motion
@@ -53,7 +44,6 @@ _LONGEST_ARROW = 0.45
 _HEAD = 0.07
 _SHAFT_RADIUS = 0.012
 _MARKER = 0.02
-_THINNER = 0.985  # share of its size that a goal's ghost is drawn with
 
 
 @dataclass(frozen=True)
@@ -84,8 +74,7 @@ def draw_scene(design: Result) -> Scene:
         design: whole or partial; without a hand the bare palm is drawn, without a motion the start.
     """
     task = design.task
-    meshes = {mesh_path(name): (solid.vertices, solid.triangles) for name, solid in polytopes(task).items()}
-    hand, item = Robot(hand_urdf(design.hand or bare_palm(design))), Robot(object_urdf(task), meshes)
+    hand, item = Robot(hand_urdf(design.hand or bare_palm(design))), object_robot(task)
     timeline = design_timeline(design, hand)
     middle, radius = _bounds(timeline, hand, item, goal_poses(task))
     visualizer, recorder = recording()
@@ -129,17 +118,7 @@ def _draw_hand(root: Any, tracks: Tracks, hand: Robot, timeline: Timeline) -> No
 def _draw_object(node: Any, item: Robot) -> None:
     """Draw the object in two tones."""
     for k, shape in enumerate(item.shapes):
-        pale: Color = tuple(0.25 * part + 0.75 for part in shape.color)  # type: ignore[assignment]
-        tones = (shape.color, pale)
-        if shape.mesh is not None:
-            mesh = faceted(*shape.mesh, tones)
-        elif shape.sides is not None:
-            mesh = patched_box(shape.sides, tones)
-        elif shape.length is None:
-            mesh = patched_sphere(shape.radius, tones)
-        else:
-            mesh = patched_cylinder(shape.radius, shape.length, tones)
-        node[f"shape{k}"].set_object(mesh, MeshPhongMaterial(vertexColors=True, shininess=40))
+        node[f"shape{k}"].set_object(two_toned(shape), MeshPhongMaterial(vertexColors=True, shininess=40))
         node[f"shape{k}"].set_transform(shape.placement)
 
 
@@ -155,10 +134,8 @@ def _draw_goals(node: Any, design: Result, item: Robot, radius: float) -> None:
             goal = node[f"goal{drawn}"]
             goal.set_transform(places[group[0]])
             for k, shape in enumerate(item.shapes):
-                # A little thinner, so that an object at its goal hides the ghost instead of mixing with it.
-                shape = shape.shrunk(_THINNER)
-                _draw_shape(goal[f"shape{k}"]["depth"], shape, depth, layer=1)
-                _draw_shape(goal[f"shape{k}"]["color"], shape, ghost, layer=2)
+                _draw_shape(goal[f"shape{k}"]["depth"], shape.thinner, depth, layer=1)
+                _draw_shape(goal[f"shape{k}"]["color"], shape.thinner, ghost, layer=2)
         return
     for k, goal in enumerate(task.motion):
         node[f"goal{k}"].set_object(Sphere(_MARKER * radius), MeshLambertMaterial(color=_hex(GOAL_COLOR)))

@@ -1,4 +1,4 @@
-"""Spheres and cylinders as meshes in two tones, so that a body's rotation can be seen."""
+"""What an object is made of as meshes in two tones, so that its rotation can be seen."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 from meshcat.geometry import Mesh, Sphere, TriangularMeshGeometry, pack_numpy_array
+
+from casadi_hands.export.page.robot import Shape
 
 Color = tuple[float, float, float]
 
@@ -41,24 +43,20 @@ class LayeredMesh(Mesh):  # type: ignore[misc]
         return data
 
 
-class PatchedMesh(TriangularMeshGeometry):  # type: ignore[misc]
-    """A mesh of patches of one colour each, with the normals of the smooth surface.
+class TonedMesh(TriangularMeshGeometry):  # type: ignore[misc]
+    """Triangles with normals and colours of their own.
 
     Args:
-        patches: for each patch the points (3, n, n) and normals (3, n, n) of a grid.
-        colors: RGB in 0..1 for each patch.
+        vertices: (V, 3).
+        faces: (T, 3) of them, counterclockwise seen from outside.
+        normals: (V, 3).
+        color: (V, 3) RGB in 0..1.
     """
 
-    def __init__(self, patches: list[tuple[np.ndarray, np.ndarray]], colors: list[Color]) -> None:
-        """Join the patches."""
-        cells = _cells(patches[0][0].shape[1])
-        count = patches[0][0][0].size
-        super().__init__(
-            vertices=np.vstack([points.reshape(3, -1).T for points, _ in patches]),
-            faces=np.vstack([cells + k * count for k in range(len(patches))]),
-            color=np.vstack([np.tile(color, (count, 1)) for color in colors]),
-        )
-        self.normals = np.vstack([normals.reshape(3, -1).T for _, normals in patches]).astype(np.float32)
+    def __init__(self, vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray, color: np.ndarray) -> None:
+        """Keep the normals beside what meshcat keeps."""
+        super().__init__(vertices, faces, color)
+        self.normals = normals.astype(np.float32)
 
     def lower(self, object_data: dict[str, Any]) -> dict[str, Any]:
         """The geometry as three.js reads it."""
@@ -67,7 +65,20 @@ class PatchedMesh(TriangularMeshGeometry):  # type: ignore[misc]
         return data
 
 
-def patched_sphere(radius: float, tones: tuple[Color, Color]) -> PatchedMesh:
+def two_toned(shape: Shape) -> TonedMesh:
+    """A primitive in its own frame, in its colour and a paler one."""
+    red, green, blue = (0.25 * part + 0.75 for part in shape.color)
+    tones = (shape.color, (red, green, blue))
+    if shape.mesh is not None:
+        return faceted(*shape.mesh, tones)
+    if shape.sides is not None:
+        return patched_box(shape.sides, tones)
+    if shape.length is None:
+        return patched_sphere(shape.radius, tones)
+    return patched_cylinder(shape.radius, shape.length, tones)
+
+
+def patched_sphere(radius: float, tones: tuple[Color, Color]) -> TonedMesh:
     """A sphere about the origin, its octants alternating in colour."""
     patches, colors = [], []
     for k, (quarter, half) in enumerate(_octants()):
@@ -75,10 +86,10 @@ def patched_sphere(radius: float, tones: tuple[Color, Color]) -> PatchedMesh:
         normals = np.array([np.cos(height) * np.cos(azimuth), np.cos(height) * np.sin(azimuth), np.sin(height)])
         patches.append((radius * normals, normals))
         colors.append(tones[(k + half) % 2])
-    return PatchedMesh(patches, colors)
+    return _joined(patches, colors)
 
 
-def patched_cylinder(radius: float, length: float, tones: tuple[Color, Color]) -> PatchedMesh:
+def patched_cylinder(radius: float, length: float, tones: tuple[Color, Color]) -> TonedMesh:
     """A cylinder about the z axis, centred; its colours continue those of spheres at its ends."""
     patches, colors = [], []
     for k, (quarter, half) in enumerate(_octants()):
@@ -92,10 +103,10 @@ def patched_cylinder(radius: float, length: float, tones: tuple[Color, Color]) -
         face = np.array([far * np.cos(azimuth), far * np.sin(azimuth), np.full_like(far, sign * length / 2)])
         patches.append((face, np.stack([0 * far, 0 * far, np.full_like(far, sign)])))
         colors.append(tones[(k + half) % 2])
-    return PatchedMesh(patches, colors)
+    return _joined(patches, colors)
 
 
-def patched_box(sides: tuple[float, float, float], tones: tuple[Color, Color]) -> PatchedMesh:
+def patched_box(sides: tuple[float, float, float], tones: tuple[Color, Color]) -> TonedMesh:
     """A box about the origin, each face in four quarters that alternate in colour, across its edges too."""
     patches, colors = [], []
     half = np.asarray(sides) / 2
@@ -113,10 +124,10 @@ def patched_box(sides: tuple[float, float, float], tones: tuple[Color, Color]) -
                         points = points.transpose(0, 2, 1)
                     patches.append((points, normals))
                     colors.append(tones[int(outwards)])
-    return PatchedMesh(patches, colors)
+    return _joined(patches, colors)
 
 
-def faceted(vertices: np.ndarray, triangles: np.ndarray, tones: tuple[Color, Color]) -> TriangularMeshGeometry:
+def faceted(vertices: np.ndarray, triangles: np.ndarray, tones: tuple[Color, Color]) -> TonedMesh:
     """A mesh of flat triangles, those of one octant about the origin in one colour.
 
     Args:
@@ -125,24 +136,33 @@ def faceted(vertices: np.ndarray, triangles: np.ndarray, tones: tuple[Color, Col
         tones: RGB in 0..1.
     """
     corners = vertices[triangles]
-    odd = np.prod(np.where(corners.mean(axis=1) < 0, -1, 1), axis=1) > 0
-    color = np.repeat(np.where(odd[:, None], tones[0], tones[1]), 3, axis=0)
-    faces = np.arange(3 * len(triangles)).reshape(-1, 3)
-    return FacetedMesh(corners.reshape(-1, 3), faces, color)
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(across, axis=1, keepdims=True)
+    normals = across / np.maximum(area, 1e-300)
+    odd = np.prod(np.where(corners.mean(axis=1) < 0, -1, 1), axis=1, keepdims=True) > 0
+    return TonedMesh(
+        corners.reshape(-1, 3),
+        np.arange(3 * len(triangles)).reshape(-1, 3),
+        np.repeat(normals, 3, axis=0),
+        np.repeat(np.where(odd, tones[0], tones[1]), 3, axis=0),
+    )
 
 
-class FacetedMesh(TriangularMeshGeometry):  # type: ignore[misc]
-    """Triangles that share no corner, each with its own normal."""
+def _joined(patches: list[tuple[np.ndarray, np.ndarray]], colors: list[Color]) -> TonedMesh:
+    """A mesh of patches of one colour each.
 
-    def lower(self, object_data: dict[str, Any]) -> dict[str, Any]:
-        """The geometry as three.js reads it."""
-        data: dict[str, Any] = super().lower(object_data)
-        corners = np.asarray(self.vertices).reshape(-1, 3, 3)
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-        packed = np.repeat(normals, 3, axis=0).astype(np.float32)
-        data["data"]["attributes"]["normal"] = pack_numpy_array(packed.T)
-        return data
+    Args:
+        patches: for each patch the points (3, n, n) of a grid, and there the normals (3, n, n) of the smooth surface.
+        colors: RGB in 0..1 for each patch.
+    """
+    cells = _cells(patches[0][0].shape[1])
+    count = patches[0][0][0].size
+    return TonedMesh(
+        np.vstack([points.reshape(3, -1).T for points, _ in patches]),
+        np.vstack([cells + k * count for k in range(len(patches))]),
+        np.vstack([normals.reshape(3, -1).T for _, normals in patches]),
+        np.vstack([np.tile(color, (count, 1)) for color in colors]),
+    )
 
 
 def _octants() -> list[tuple[tuple[float, float], int]]:
