@@ -12,6 +12,7 @@ from casadi_hands.export.page.robot import Shape
 Color = tuple[float, float, float]
 
 _STEPS = 10  # mesh cells along each side of a patch; a patch spans a quarter turn
+_DIGITS = 4  # to which normals are equal, and middles of faces between octants
 
 
 class FineSphere(Sphere):  # type: ignore[misc]
@@ -128,7 +129,7 @@ def patched_box(sides: tuple[float, float, float], tones: tuple[Color, Color]) -
 
 
 def faceted(vertices: np.ndarray, triangles: np.ndarray, tones: tuple[Color, Color]) -> TonedMesh:
-    """A mesh of flat triangles, those of one octant about the origin in one colour.
+    """A convex mesh of flat faces, each in the colour of the octant about the origin that its middle is in.
 
     Args:
         vertices: (V, 3).
@@ -139,7 +140,13 @@ def faceted(vertices: np.ndarray, triangles: np.ndarray, tones: tuple[Color, Col
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = np.linalg.norm(across, axis=1, keepdims=True)
     normals = across / np.maximum(area, 1e-300)
-    odd = np.prod(np.where(corners.mean(axis=1) < 0, -1, 1), axis=1, keepdims=True) > 0
+    # Of what is convex, triangles with one normal are of one face.
+    face = np.unique(np.round(normals, _DIGITS) + 0.0, axis=0, return_inverse=True)[1].ravel()
+    moments = np.zeros((len(triangles), 3))
+    np.add.at(moments, face, area * corners.mean(axis=1))
+    # A middle between octants counts to one of them whatever rounding makes of it.
+    signs = np.where(np.round(moments / np.abs(moments).max(), _DIGITS) < 0, -1, 1)
+    odd = np.prod(signs, axis=1, keepdims=True)[face] > 0
     return TonedMesh(
         corners.reshape(-1, 3),
         np.arange(3 * len(triangles)).reshape(-1, 3),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from casadi_hands.export.page.shapes import patched_cylinder, patched_sphere
+from casadi_hands.export.page.shapes import faceted, patched_cylinder, patched_sphere
 
 TONES = ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -41,3 +41,28 @@ def test_colours_alternate_from_octant_to_octant(mesh):
     assert (colors[red] == TONES[0]).all()
     assert (colors[~red] == TONES[1]).all()
     assert 0.4 < red.mean() < 0.6
+
+
+def test_a_flat_face_has_one_colour_however_it_is_cut(rng):
+    """Of a prism of twelve sides, each face cut into triangles that meet at any point of it."""
+    angles = np.pi / 6 * np.arange(12)
+    rim = np.column_stack([0.03 * np.cos(angles), 0.02 * np.sin(angles)])
+    faces = [[(*rim[k], -0.05), (*rim[(k + 1) % 12], -0.05), (*rim[(k + 1) % 12], 0.05)] for k in range(12)]
+    faces = [np.array([*face, (*rim[k], 0.05)]) for k, face in enumerate(faces)]
+    faces += [np.column_stack([rim, np.full(12, 0.05)]), np.column_stack([rim, np.full(12, -0.05)])[::-1]]
+    corners = []
+    for face in faces:
+        inside = rng.dirichlet(np.ones(len(face))) @ face
+        corners += [(inside, a, b) for a, b in zip(face, np.roll(face, -1, axis=0), strict=True)]
+    vertices = np.array(corners).reshape(-1, 3)
+    mesh = faceted(vertices, np.arange(len(vertices)).reshape(-1, 3), TONES)
+    assert outward(mesh).min() > 0
+    ends = np.cumsum([3 * len(face) for face in faces])
+    colors = [np.unique(part, axis=0) for part in np.split(mesh.color, ends[:-1])]
+    assert [len(each) for each in colors] == [1] * 14
+    # Sides in four quarters, above and below alike since each reaches from end to end.
+    red = [bool((each == TONES[0]).all()) for each in colors]
+    assert red[:12] == [True] * 3 + [False] * 3 + [True] * 3 + [False] * 3
+    normals = mesh.normals.reshape(-1, 3, 3)
+    sides = mesh.vertices[mesh.faces]
+    assert np.abs(np.einsum("tki,tji->tkj", normals, sides - sides[:, :1])).max() < 1e-8
