@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import subprocess
 import tempfile
 import time
@@ -13,10 +12,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-CHROMIUM = next(
-    (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
-)
-"""Where the browser is; None where there is none."""
+import pytest
+from browser import MISSING, browser
+
+CHROMIUM = browser()
+needs_browser = pytest.mark.skipif(CHROMIUM is None, reason=MISSING)
 _FLAGS = (
     "--headless=new",
     "--remote-debugging-pipe",
@@ -26,6 +26,7 @@ _FLAGS = (
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-dev-shm-usage",
+    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
     # WebGL without a graphics card; only pages of our own are opened.
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
@@ -33,11 +34,11 @@ _FLAGS = (
 
 
 class Browser:
-    """One page of a browser, and all that it says.
+    """One page of a browser, and all that it says. Nothing but this machine can be reached from it.
 
     Attributes:
         problems: console errors and exceptions, of the page and of its frames.
-        requests: addresses that were asked for.
+        requests: addresses that were asked for, those of sockets among them.
     """
 
     def __init__(self) -> None:
@@ -91,13 +92,15 @@ class Browser:
                 return message["result"]
             self._heed(message)
 
-    def open(self, path: Path, width: int = 1440, height: int = 900, dark: bool = False) -> None:
-        """Open a file in a window of a size, px, with the network off."""
-        self.call("Network.emulateNetworkConditions", offline=True, latency=0, downloadThroughput=0, uploadThroughput=0)
+    def open(self, page: Path | str, width: int = 1440, height: int = 900, dark: bool = False) -> None:
+        """Open a file with the network off, or an address of this machine, in a window of a size, px."""
+        offline, address = isinstance(page, Path), page.resolve().as_uri() if isinstance(page, Path) else page
+        reach = {"latency": 0, "downloadThroughput": 0 if offline else -1, "uploadThroughput": 0 if offline else -1}
+        self.call("Network.emulateNetworkConditions", offline=offline, **reach)
         self.look(width, height, dark)
         self.problems.clear()
         self.requests.clear()
-        self.call("Page.navigate", url=path.resolve().as_uri())
+        self.call("Page.navigate", url=address)
         self.wait("document.readyState === 'complete'")
 
     def look(self, width: int, height: int, dark: bool = False) -> None:
@@ -119,8 +122,8 @@ class Browser:
             raise RuntimeError(str(found["exceptionDetails"].get("exception", found["exceptionDetails"])))
         return found["result"].get("value")
 
-    def wait(self, expression: str, seconds: float = 60.0) -> None:
-        """Wait until an expression on the page is true.
+    def wait(self, expression: str, seconds: float = 60.0) -> Any:
+        """The value of an expression on the page, once it is true.
 
         Raises:
             TimeoutError: it is not within so many seconds.
@@ -128,12 +131,23 @@ class Browser:
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             try:
-                if self.evaluate(expression):
-                    return
+                if value := self.evaluate(expression):
+                    return value
             except RuntimeError:
                 pass  # the page is not there yet
             time.sleep(0.05)
-        raise TimeoutError(expression)
+        raise TimeoutError(f"{expression}; {self.problems}")
+
+    def drag(self, start: tuple[float, float], end: tuple[float, float], steps: int = 8) -> None:
+        """Press the mouse, move it, and let it go; px. Pages heed each of these at the next frame."""
+        held: dict[str, Any] = {"button": "left", "buttons": 1, "clickCount": 1}
+        self._mouse("mouseMoved", *start)
+        time.sleep(0.3)
+        self._mouse("mousePressed", *start, **held)
+        for k in range(1, steps + 1):
+            self._mouse("mouseMoved", *(a + (b - a) * k / steps for a, b in zip(start, end, strict=True)), **held)
+            time.sleep(0.1)
+        self._mouse("mouseReleased", *end, **held)
 
     def picture(self, path: Path, whole: bool = False) -> None:
         """Write a PNG of the window, or of the whole page."""
@@ -144,6 +158,9 @@ class Browser:
         """Print the page."""
         found = self.call("Page.printToPDF", printBackground=True, preferCSSPageSize=True)
         path.write_bytes(b64decode(found["data"]))
+
+    def _mouse(self, kind: str, x: float, y: float, **held: Any) -> None:
+        self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, **held)
 
     def _message(self) -> Any:
         while b"\0" not in self._rest:
@@ -162,6 +179,8 @@ class Browser:
         elif method == "Runtime.consoleAPICalled" and given["type"] in ("error", "assert"):
             self.problems.append(" ".join(str(each.get("value", each.get("description"))) for each in given["args"]))
         elif method == "Log.entryAdded" and given["entry"]["level"] == "error":
-            self.problems.append(given["entry"]["text"])
+            self.problems.append(f"{given['entry']['text']} {given['entry'].get('url', '')}".strip())
         elif method == "Network.requestWillBeSent":
             self.requests.append(given["request"]["url"])
+        elif method == "Network.webSocketCreated":
+            self.requests.append(given["url"])

@@ -10,10 +10,11 @@ import pytest
 
 from casadi_hands.studio.session import STARTER, Session
 from casadi_hands.task import load_task
-from tests.studio.browser import CHROMIUM, Browser
+from tests.export.browser import Browser, needs_browser
 
 viser = pytest.importorskip("viser")
 iio = pytest.importorskip("imageio.v3")
+pytestmark = needs_browser
 
 FIELD = """[...document.querySelectorAll("label, .mantine-Text-root")].find((e) => e.textContent === "%s")
   .closest(".mantine-Flex-root").querySelector("input")"""
@@ -32,15 +33,13 @@ def studio(tmp_path):
 
 
 @pytest.fixture
-def browser(tmp_path):
-    if CHROMIUM is None:
-        pytest.skip("no browser that runs without a screen")
-    with Browser(tmp_path / "profile") as browser:
+def browser():
+    with Browser() as browser:
         yield browser
 
 
 def picture(browser, path):
-    browser.screenshot(path)
+    browser.picture(path)
     return iio.imread(path)[..., :3].astype(int)
 
 
@@ -54,7 +53,7 @@ def until(found, seconds=30.0):
 
 def test_the_page_edits_the_file_and_asks_nobody_else(studio, browser, tmp_path):
     page, address = studio
-    browser.send("Page.navigate", url=address)
+    browser.open(address)
     assert browser.wait('document.querySelector("textarea")?.value') == STARTER
     time.sleep(4)  # the picture comes a little later
     before = picture(browser, tmp_path / "before.png")
@@ -80,7 +79,7 @@ def test_the_page_edits_the_file_and_asks_nobody_else(studio, browser, tmp_path)
     # A field.
     browser.evaluate(f"{FIELD % 'mass'}.select()")
     browser.evaluate(f"{FIELD % 'mass'}.focus()")
-    browser.send("Input.insertText", text="0.25")
+    browser.call("Input.insertText", text="0.25")
     until(lambda: page.session.understood.written and page.session.understood.written.object.mass == 0.25)
     browser.wait('document.querySelector("textarea").value.includes("mass: 0.25")')
 
@@ -88,18 +87,18 @@ def test_the_page_edits_the_file_and_asks_nobody_else(studio, browser, tmp_path)
     kept = page.session.text
     browser.evaluate(f"{FIELD % 'shapes'}.focus()")
     browser.evaluate(f"{FIELD % 'shapes'}.select()")
-    browser.send("Input.insertText", text="[sphere: {center")
+    browser.call("Input.insertText", text="[sphere: {center")
     time.sleep(3)
     assert browser.evaluate(f"{FIELD % 'shapes'}.value") == "[sphere: {center"
     assert page.session.text == kept
     browser.evaluate(f"{FIELD % 'shapes'}.select()")
-    browser.send("Input.insertText", text="[capsule: {start: [0, 0, -0.03], end: [0, 0, 0.03], radius: 0.02}]")
+    browser.call("Input.insertText", text="[capsule: {start: [0, 0, -0.03], end: [0, 0, 0.03], radius: 0.02}]")
     browser.wait('document.querySelector("textarea").value.includes("-0.03]")')
 
     # The text, and what check says of it.
     browser.evaluate('document.querySelector("textarea").focus()')
     browser.evaluate('document.querySelector("textarea").setSelectionRange(1e6, 1e6)')
-    browser.send("Input.insertText", text="gravty: [0, 0, 0]\n")
+    browser.call("Input.insertText", text="gravty: [0, 0, 0]\n")
     assert "did you mean gravity?" in browser.wait('document.querySelector(".studio .bad")?.textContent')
     browser.evaluate("[...document.querySelectorAll('button')].find((e) => e.textContent === 'undo').click()")
     browser.wait('!document.querySelector(".studio .bad")')
@@ -113,7 +112,7 @@ def test_the_page_edits_the_file_and_asks_nobody_else(studio, browser, tmp_path)
     assert task.motion[1].position == second.position
 
     picture(browser, tmp_path / "end.png")
-    assert browser.errors == []
+    assert browser.problems == []
     hosts = {urlsplit(each.removeprefix("blob:")).netloc for each in browser.requests if not each.startswith("data:")}
     assert hosts == {urlsplit(address).netloc}
 
@@ -122,7 +121,7 @@ def test_a_hand_that_comes_is_shown_and_moves(studio, browser, tmp_path):
     from tests.export.example import example_design
 
     page, address = studio
-    browser.send("Page.navigate", url=address)
+    browser.open(address)
     browser.wait('document.querySelector("textarea")?.value')
     example_design().save(tmp_path / "result")
     browser.wait('document.body.innerText.includes("made by hand")')
@@ -133,4 +132,4 @@ def test_a_hand_that_comes_is_shown_and_moves(studio, browser, tmp_path):
     other = picture(browser, tmp_path / "other.png")
     middle = np.s_[200:700, 450:1060]
     assert (np.abs(one - other)[middle].sum(axis=2) > 60).sum() > 200
-    assert browser.errors == []
+    assert browser.problems == []

@@ -1,7 +1,5 @@
 """A page from a stranger does not reach the browser; what the folder's data give does."""
 
-import shutil
-import subprocess
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from threading import Thread
 
@@ -10,6 +8,7 @@ import pytest
 from casadi_hands.errors import DesignError
 from casadi_hands.export.page.own_page import open_page
 from casadi_hands.export.page.page import MenuEntry, write_page
+from tests.export.browser import Browser, needs_browser
 from tests.export.example import example_design
 
 
@@ -104,21 +103,6 @@ def test_without_a_browser_the_message_says_what_to_open(folder, monkeypatch):
         open_page(folder)
 
 
-def fetched(address, server, chromium, profile):
-    """What a browser asks a server on this machine for when it opens a page."""
-    asked = server.asked
-    asked.clear()
-    options = [
-        "--headless",
-        "--no-sandbox",
-        "--disable-gpu",
-        "--virtual-time-budget=3000",
-        f"--user-data-dir={profile}",
-    ]
-    subprocess.run([chromium, *options, "--dump-dom", address], capture_output=True, timeout=120, check=True)
-    return list(asked)
-
-
 @pytest.fixture
 def server():
     class Handler(BaseHTTPRequestHandler):
@@ -137,15 +121,19 @@ def server():
         server.shutdown()
 
 
-def test_a_strangers_page_fetches_nothing(folder, opened, server, tmp_path):
-    chromium = shutil.which("chromium") or shutil.which("google-chrome")
-    if chromium is None:
-        pytest.skip("no browser that runs without a screen")
+@needs_browser
+def test_a_strangers_page_fetches_nothing(folder, opened, server):
     page, where = folder / "viewer.html", f"http://127.0.0.1:{server.server_port}"
     spoilt = f"<img src='{where}/image'><script>fetch('{where}/script')</script>"
     page.write_text(
         page.read_text().replace("<body>", f"<body>{spoilt}").replace("default-src 'none'", "default-src *")
     )
-    assert "/script" in fetched(page.as_uri(), server, chromium, tmp_path / "profile")
-    open_page(folder)
-    assert fetched(opened[0], server, chromium, tmp_path / "profile") == []
+    with Browser() as browser:
+        browser.open(page.as_uri())
+        assert "/script" in server.asked
+        open_page(folder)
+        server.asked.clear()
+        browser.open(opened[0])
+        browser.evaluate("new Promise((done) => setTimeout(done, 1000))")
+        assert server.asked == []
+        assert [each for each in browser.requests if not each.startswith(("data:", "blob:"))] == opened

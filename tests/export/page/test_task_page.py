@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
-import subprocess
 from base64 import b64decode
 
 import numpy as np
@@ -18,6 +16,7 @@ from casadi_hands.errors import DesignError
 from casadi_hands.export.page.task_page import write_task_page
 from casadi_hands.task import load_task
 from tests.documents import ROOT
+from tests.export.browser import Browser, needs_browser
 from tests.export.example import example_design, example_task
 
 
@@ -77,26 +76,22 @@ def test_check_shows_a_drawing_task(tmp_path):
     assert texts == [*load_task(file).fingers, "start", "2 s", "4 s", "6 s", "8 s"]
 
 
+@needs_browser
 def test_a_browser_puts_the_names_beside_what_they_name(tmp_path):
-    chromium = shutil.which("chromium") or shutil.which("google-chrome")
-    if chromium is None:
-        pytest.skip("no browser that runs without a screen")
-    page = tmp_path / "task.html"
-    write_task_page(example_task(), page, "not solved")
-    # Where the browser's own library puts the dots, told in the page for the test.
-    probe = """<script>setTimeout(() => { const told = [...document.querySelectorAll(".label")].map((label) => {
+    write_task_page(example_task(), tmp_path / "task.html", "not solved")
+    # Where the browser's own library puts the dots.
+    probe = """[...document.querySelectorAll(".label")].map((label) => {
       const entry = design.labels.find((each) => each.text === label.textContent);
       const at = viewer.scene_tree.find(entry.path).object.getWorldPosition(viewer.camera.position.clone());
       at.project(viewer.camera);
       const box = label.getBoundingClientRect();
       return [label.textContent, box.left - (at.x + 1) / 2 * innerWidth, box.top - (1 - at.y) / 2 * innerHeight,
         box.width, at.x, at.y];
-    }); document.body.dataset.told = JSON.stringify(told); }, 1500);</script></body>"""
-    page.write_text(page.read_text().replace("</body>", probe))
-    options = ["--headless", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-    options += ["--virtual-time-budget=4000", "--window-size=1440,900", f"--user-data-dir={tmp_path / 'profile'}"]
-    ran = subprocess.run([chromium, *options, "--dump-dom", page.as_uri()], capture_output=True, timeout=120, text=True)
-    told = json.loads(re.search(r'data-told="([^"]*)"', ran.stdout)[1].replace("&quot;", '"'))
+    })"""
+    with Browser() as browser:
+        browser.open(tmp_path / "task.html")
+        browser.wait("document.querySelectorAll('.label[style*=visible]').length === 5")
+        told = browser.evaluate(probe)
     assert {name for name, *_ in told} == {"thumb", "index", "middle", "start, 2 s", "1 s"}
     for _, right, below, width, x, y in told:
         assert right == pytest.approx(9, abs=1)

@@ -5,11 +5,11 @@ import re
 import pytest
 
 from casadi_hands.export.report.page import write_report
-from tests.export.browser import CHROMIUM, Browser
+from tests.export.browser import Browser, needs_browser
 from tests.export.example import example_design
 from tests.export.report.test_report import nasty_design
 
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")
+pytestmark = needs_browser
 READY = "document.querySelectorAll('#goals img').length === 3"
 CLOCK = "parseFloat(document.getElementById('clock').textContent)"
 LINE = "parseFloat(document.querySelector('[data-panel=angles] .now').style.left)"
@@ -69,10 +69,7 @@ def test_the_animation_goes_to_where_a_plot_is_pressed(opened):
             return [box.left, box.top + 20, box.width];
         })()"""
     )
-    for kind in ("mousePressed", "mouseReleased"):
-        opened.call(
-            "Input.dispatchMouseEvent", type=kind, x=x + 0.75 * width, y=y, button="left", clickCount=1, buttons=1
-        )
+    opened.drag((x + 0.5 * width, y), (x + 0.75 * width, y))
     opened.wait(f"Math.abs({CLOCK} - 1.5) < 0.02")  # the motion takes 2 s
     assert opened.evaluate(f"Number({INNER}.getElementById('scrub').value)") == pytest.approx(1.5, abs=0.02)
     torque = opened.evaluate("document.querySelector('[data-panel=torques] .legend b').textContent")
