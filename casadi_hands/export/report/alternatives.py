@@ -8,13 +8,12 @@ from typing import Any
 
 from casadi_hands.errors import DesignError
 from casadi_hands.export.checked import read_record
-from casadi_hands.export.record import STATUSES, hand_from_record
+from casadi_hands.export.record import hand_from_record
 from casadi_hands.export.report.drawing import palm_drawing
 from casadi_hands.export.report.markup import Html, badge, paragraph, percent, section, table, text
+from casadi_hands.export.report.words import status_kind
 from casadi_hands.problem.hand import Hand
 from casadi_hands.problem.stored import read_json
-
-_KINDS = dict(zip(STATUSES, ("good", "warn", "bad"), strict=True))
 
 
 @dataclass(frozen=True)
@@ -100,7 +99,7 @@ def alternatives_section(seeds: list[Seed]) -> Html:
     rows = [
         (
             f"seed {each.seed}",
-            badge(each.status, _KINDS.get(each.status, "bad")),
+            badge(each.status, status_kind(each.status)),
             "+".join(map(str, each.joints)),
             "" if each.margin is None or each.margin < 0 else percent(each.margin),
             "" if each.torque is None else f"{each.torque:.3g}",
@@ -138,6 +137,6 @@ def _card(each: Seed, number: int) -> str:
     links = f'<a href="{each.folder}/viewer.html">watch</a> · <a href="{each.folder}/report.html">report</a>'
     here = "this hand" if number == 0 else links
     return (
-        f'<div class="card">{drawn}<p><b>seed {each.seed}</b> {badge(each.status, _KINDS.get(each.status, "bad"))}<br>'
+        f'<div class="card">{drawn}<p><b>seed {each.seed}</b> {badge(each.status, status_kind(each.status))}<br>'
         f"{text(facts)}<br>{here}</p></div>"
     )

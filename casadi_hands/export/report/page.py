@@ -13,20 +13,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from casadi_hands.export.page.page import page_text
-from casadi_hands.export.record import STATUSES
 from casadi_hands.export.report.alternatives import Seed, alternatives_section
 from casadi_hands.export.report.checks import audit_section, replay_section
 from casadi_hands.export.report.data import Panel, panels, plotted, with_commands
 from casadi_hands.export.report.dimensions import dimensions_section
 from casadi_hands.export.report.effort import costs_section, motors_section, run_panel
 from casadi_hands.export.report.markup import Html, badge, number, paragraph, section, table, text
-from casadi_hands.export.report.words import in_words, stage_title
+from casadi_hands.export.report.words import in_words, stage_title, status_kind
 
 if TYPE_CHECKING:
     from casadi_hands.problem.result import Result
 
 REPORT = "report.html"
-_KINDS = dict(zip(STATUSES, ("good", "warn", "bad"), strict=True))
 
 
 def write_report(design: Result, path: Path, alternatives: Sequence[Seed] = ()) -> None:
@@ -93,12 +91,12 @@ def _head(design: Result) -> Html:
         facts.append(f"{fingers}, {joints} joint{'' if joints == 1 else 's'}{shared}")
     if motion is not None:
         facts.append(f"{len(task.motion)} goals in {motion.time[-1] - motion.time[0]:.3g} s")
-    status = badge(design.status, _KINDS[design.status])
+    status = badge(design.status, status_kind(design.status))
     reason = ""
     if design.reason:
         words = number(in_words(design.reason, hand))
         words = words[:1].upper() + words[1:]
-        reason = paragraph(words + ("" if words.endswith(".") else "."), f"reason {_KINDS[design.status]}")
+        reason = paragraph(words + ("" if words.endswith(".") else "."), f"reason {status_kind(design.status)}")
     meaning = {
         "certified": "Every limit is kept, in the files and in a simulator that took no part in the design.",
         "feasible": "There is a motion, and a limit is missed or not judged.",
@@ -159,9 +157,7 @@ def _data(design: Result, found: Sequence[Panel]) -> dict[str, Any]:
     return {
         "plots": None if time is None else plotted(found, time),
         "runs": None if runs is None else plotted([runs[0]], runs[1]),
-        "goals": []
-        if time is None
-        else [{"label": f"goal {k + 1}", "time": g.at} for k, g in enumerate(design.task.motion)],
+        "goals": [] if time is None else _moments(design),
     }
 
 

@@ -55,6 +55,12 @@ _STAGES = {
     "whole_hand": "Hand and object together",
     "refine": "Exact contacts, clearances and limits",
 }
+_KINDS = {"certified": "good", "feasible": "warn"}
+
+
+def status_kind(status: str) -> str:
+    """What a design's status is: good, warn or bad, as badges are."""
+    return _KINDS.get(status, "bad")
 
 
 def figure_title(name: str) -> str:
