@@ -5,19 +5,10 @@ from __future__ import annotations
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from casadi_hands.export.report import markup as html
 from casadi_hands.export.report.data import Curve, Panel, css, with_commands
-from casadi_hands.export.report.markup import (
-    Html,
-    badge,
-    bar,
-    details,
-    number,
-    paragraph,
-    percent,
-    section,
-    table,
-    text,
-)
 from casadi_hands.export.report.motors import Fit, demands, fit, lightest
 from casadi_hands.export.report.words import plain, stage_title, term_title
 from casadi_hands.task.servos import SERVOS
@@ -26,11 +17,11 @@ if TYPE_CHECKING:
     from casadi_hands.problem.result import Result
 
 
-def motors_section(design: Result) -> Html:
+def motors_section(design: Result) -> html.Html:
     """Each servo of the library with its shares of torque and speed, and the lightest that does in each place."""
     title = "Motors that would do"
     if design.hand is None or design.motion is None:
-        return section("motors", title, paragraph("There is no motion to choose them by."))
+        return html.section("motors", title, html.paragraph("There is no motion to choose them by."))
     asked = demands(design.hand, with_commands(design))
     least = design.certificate.get("least_stiffness", {}).get("value")
     rows = [_servo(fit(name, asked), least, design.hand.servo) for name in SERVOS]
@@ -54,8 +45,10 @@ def motors_section(design: Result) -> Html:
         for each in asked
     ]
     where = "Motor" if design.hand.drive else "Joint"
-    each = table((where, "torque, N·m", "speed, rad/s", "the lightest that does"), places)
-    return section("motors", title, paragraph(words), table(head, rows), details("One by one", each))
+    each = html.table((where, "torque, N·m", "speed, rad/s", "the lightest that does"), places)
+    return html.section(
+        "motors", title, html.paragraph(words), html.table(head, rows), html.details("One by one", each)
+    )
 
 
 def _servo(found: Fit, least: float | None, built_in: str | None) -> tuple[str, ...]:
@@ -64,11 +57,11 @@ def _servo(found: Fit, least: float | None, built_in: str | None) -> tuple[str, 
     stiffness = "not stated" if servo.stiffness is None else f"{servo.stiffness:g}"
     if servo.stiffness is not None and least is not None and servo.stiffness <= least:
         stiffness += ", too soft"
-    speed = bar(found.speed, percent(found.speed) if isfinite(found.speed) else "stalls", _over(found.speed))
+    speed = html.bar(found.speed, html.percent(found.speed) if isfinite(found.speed) else "stalls", _over(found.speed))
     return (
         f"{found.servo}{' (in this hand)' if found.servo == built_in else ''}",
-        badge(found.words, kind),
-        bar(found.torque, percent(found.torque), _over(found.torque)),
+        html.badge(found.words, kind),
+        html.bar(found.torque, html.percent(found.torque), _over(found.torque)),
         speed,
         stiffness,
         f"{1e3 * servo.mass:.3g}",
@@ -80,30 +73,36 @@ def _over(share: float) -> str:
     return "bad" if share > 1 else ""
 
 
-def costs_section(design: Result) -> Html:
+def costs_section(design: Result) -> html.Html:
     """What the cost of each stage is made of, and how it fell from run to run."""
-    parts = [paragraph("What each stage weighed against each other when it ended: the weighted value of each term.")]
+    parts = [
+        html.paragraph("What each stage weighed against each other when it ended: the weighted value of each term.")
+    ]
     for stage, terms in design.costs.items():
         whole = sum(each["value"] or 0.0 for each in terms.values())
         ranked = sorted(terms.items(), key=lambda item: -(item[1]["value"] or 0.0))
         rows = [
-            (term_title(stage, name), bar(value / whole if whole > 0 else 0.0, number(f"{value:.3g}")), f"{weight:.3g}")
+            (
+                term_title(stage, name),
+                html.bar(value / whole if whole > 0 else 0.0, html.number(f"{value:.3g}")),
+                f"{weight:.3g}",
+            )
             for name, each in ranked
             for value, weight in [(each["value"] or 0.0, each["weight"] or 0.0)]
         ]
         shown = [row for row, (_, each) in zip(rows, ranked, strict=True) if (each["value"] or 0.0) > 1e-3 * whole]
-        inner = table(("Term", "weighted value", "weight"), shown or rows, "costs")
+        inner = html.table(("Term", "weighted value", "weight"), shown or rows, "costs")
         if 0 < len(shown) < len(rows):
-            rest = table(("Term", "weighted value", "weight"), rows[len(shown) :], "costs")
-            inner = Html(inner + details(f"{len(rows) - len(shown)} more, each less than 0.1 %", rest))
-        parts.append(Html(f"<h3>{text(stage_title(stage))} <small>{whole:.3g} in all</small></h3>{inner}"))
+            rest = html.table(("Term", "weighted value", "weight"), rows[len(shown) :], "costs")
+            inner = html.Html(inner + html.details(f"{len(rows) - len(shown)} more, each less than 0.1 %", rest))
+        parts.append(html.Html(f"<h3>{html.text(stage_title(stage))} <small>{whole:.3g} in all</small></h3>{inner}"))
     if design.stages:
-        parts.append(Html('<h3>From run to run</h3><div id="runs"></div>'))
+        parts.append(html.Html('<h3>From run to run</h3><div id="runs"></div>'))
         parts.append(_runs(design.stages))
-    return section("costs", "What the solver weighed", *parts)
+    return html.section("costs", "What the solver weighed", *parts)
 
 
-def _runs(stages: list[dict[str, Any]]) -> Html:
+def _runs(stages: list[dict[str, Any]]) -> html.Html:
     """A line for each stage's kind of run: how many, how many iterations, how long, how many did not end well."""
     groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
     for run in stages:
@@ -120,7 +119,7 @@ def _runs(stages: list[dict[str, Any]]) -> Html:
         for (stage, step), runs in groups.items()
     ]
     head = ("Stage", "step", "runs", "iterations", "seconds", "without a solution")
-    return details(f"The {len(stages)} solver runs by stage and annealing step", table(head, rows))
+    return html.details(f"The {len(stages)} solver runs by stage and annealing step", html.table(head, rows))
 
 
 _WELL = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
@@ -129,8 +128,6 @@ _STAGE_COLORS = ((0.20, 0.47, 0.75), (0.80, 0.36, 0.58), (0.10, 0.58, 0.62), (0.
 
 def run_panel(stages: list[dict[str, Any]]) -> tuple[Panel, Any] | None:
     """The objective of each solver run in order, by stage, and the runs' numbers (R,); None without any above zero."""
-    import numpy as np
-
     values = np.array([_objective(run) for run in stages])
     if not (values > 0).any():
         return None
