@@ -7,35 +7,18 @@ from pathlib import Path
 
 from casadi_hands.errors import TaskError
 from casadi_hands.studio.understood import understand
+from casadi_hands.task.starter import Idea, starter
 from casadi_hands.task.textfile import read
 
 _MOST_STEPS = 200  # back
-
-STARTER = """\
-# A task in metres, seconds and kilograms; world z is up. `casadi-hands fields` lists all fields.
-name: my task
-object:
-  mass: 0.1
-  shapes:
-    - capsule: {start: [0, 0, -0.04], end: [0, 0, 0.04], radius: 0.02}
-palm: {radius: 0.06, position: [0, 0, 0.3], facing: [1, 0, 0]}
-motion:
-  - {at: 0, position: [0.09, 0, 0.3]}
-  - {at: 1, position: [0.09, 0.02, 0.3]}
-fingers:
-  thumb: {touches: [0, 0.02, 0]}
-  index: {touches: [0, -0.02, 0.025]}
-  middle: {touches: [0, -0.02, -0.025]}
-friction: 0.6
-"""
-"""Where a new task begins: one that can be used, to be changed."""
 
 
 class Session:
     """One task file under edits.
 
     Args:
-        path: the file; where there is none, a new task begins, which the first `save` writes.
+        path: the file; where there is none, a new task begins as that of `casadi-hands new`, which the first `save`
+            writes.
 
     Attributes:
         path: of the file.
@@ -50,7 +33,7 @@ class Session:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._saved = read(path) if path.exists() else None
-        self.text = STARTER if self._saved is None else self._saved
+        self.text = starter(Idea(path.stem)) if self._saved is None else self._saved
         self._before: list[str] = []
         self.understood = self.last = understand(self.text, path)
 

@@ -13,15 +13,17 @@ from casadi_hands.studio.document import shown_at, typed, value_at, with_field, 
 from casadi_hands.studio.drawing import names_of
 from casadi_hands.studio.fields import form_of
 from casadi_hands.studio.places import moved, places, removed, with_finger, with_goal
-from casadi_hands.studio.session import STARTER, Session
+from casadi_hands.studio.session import Session
 from casadi_hands.task import describe_fields, load_task, parse_task
+from casadi_hands.task.starter import Idea, starter
 from tests.documents import ROOT
+from tests.studio.example import CAPSULE
 
 FILES = sorted((ROOT / "problems").glob("*.yaml"))
 KINDS = [file for file in FILES if file.stem in ("draw_box", "pencil_pick_up", "sphere_rotation", "vertical_flip")]
 
 
-def session(tmp_path, text=STARTER):
+def session(tmp_path, text=CAPSULE):
     path = tmp_path / "task.yaml"
     path.write_text(text, encoding="utf-8")
     return Session(path)
@@ -94,12 +96,22 @@ def test_turns_go_on_past_half_a_turn(tmp_path):
     assert value_at(edited.text, ("motion", 1, "rotation")) == {"axis": [0, 0, 1], "degrees": 250}
     for _ in range(5):
         drag(edited, "object, goal 1 at 1 s", turn=(0, 0, -50))
-    assert edited.text == STARTER
+    assert edited.text == CAPSULE
+
+
+def test_a_new_task_is_the_one_that_the_command_new_writes(tmp_path):
+    edited = Session(tmp_path / "my lid.yaml")
+    assert edited.text == starter(Idea("my lid"))
+    assert edited.unsaved
+    assert edited.understood.solvable
+    assert edited.understood.doubts == edited.understood.questions == ()
+    edited.save()
+    assert load_task(edited.path).name == "my lid"
 
 
 def test_a_task_from_nothing_is_the_task_that_a_person_would_write(tmp_path):
     edited = Session(tmp_path / "ball.yaml")
-    assert edited.unsaved
+    edited.edit(lambda _: CAPSULE)
     fields = {
         ("name",): "turn a ball",
         ("object", "mass"): "0.05",
@@ -147,7 +159,7 @@ def test_fingers_come_and_go(tmp_path):
     assert min(np.linalg.norm(added.position - other) for other in others) > 0.03
     assert edited.understood.solvable
     edited.edit(lambda text: removed(text, added))
-    assert edited.text == STARTER
+    assert edited.text == CAPSULE
 
 
 def test_the_start_says_it_can_be_solved_and_mistakes_what_they_are(tmp_path):
@@ -167,7 +179,7 @@ def test_the_start_says_it_can_be_solved_and_mistakes_what_they_are(tmp_path):
     assert not edited.understood.solvable
     for _ in range(4):
         edited.undo()
-    assert edited.text == STARTER
+    assert edited.text == CAPSULE
     assert not edited.can_undo
 
 
@@ -178,18 +190,18 @@ def test_words_that_are_no_value_change_nothing(words, tmp_path):
     edited = session(tmp_path)
     with pytest.raises(TaskError):
         edited.edit(lambda text: with_field(text, ("friction",), words))
-    assert edited.text == STARTER
+    assert edited.text == CAPSULE
 
 
 def test_a_path_through_a_number_is_no_place():
     with pytest.raises(TaskError, match=r"no place for friction\.soft"):
-        with_value(STARTER, ("friction", "soft"), 1)
+        with_value(CAPSULE, ("friction", "soft"), 1)
 
 
 def test_what_another_program_wrote_is_not_overwritten_unasked(tmp_path):
     edited = session(tmp_path)
     edited.edit(lambda text: with_value(text, ("friction",), 0.7))
-    edited.path.write_text(STARTER + "# mine\n", encoding="utf-8")
+    edited.path.write_text(CAPSULE + "# mine\n", encoding="utf-8")
     with pytest.raises(TaskError, match="changed by another program"):
         edited.save()
     assert edited.path.read_text(encoding="utf-8").endswith("# mine\n")

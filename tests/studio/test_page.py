@@ -8,9 +8,10 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
-from casadi_hands.studio.session import STARTER, Session
+from casadi_hands.studio.session import Session
 from casadi_hands.task import load_task
 from tests.export.browser import Browser, needs_browser
+from tests.studio.example import CAPSULE
 
 viser = pytest.importorskip("viser")
 iio = pytest.importorskip("imageio.v3")
@@ -26,6 +27,7 @@ def studio(tmp_path):
     from casadi_hands.studio.studio import Studio
 
     server, address = open_server(label="task")
+    (tmp_path / "task.yaml").write_text(CAPSULE, encoding="utf-8")
     page = Studio(server, Session(tmp_path / "task.yaml"), ("false",), tmp_path / "result")
     yield page, address
     page.close()
@@ -54,7 +56,7 @@ def until(found, seconds=30.0):
 def test_the_page_edits_the_file_and_asks_nobody_else(studio, browser, tmp_path):
     page, address = studio
     browser.open(address)
-    assert browser.wait('document.querySelector("textarea")?.value') == STARTER
+    assert browser.wait('document.querySelector("textarea")?.value') == CAPSULE
     time.sleep(4)  # the picture comes a little later
     before = picture(browser, tmp_path / "before.png")
     assert len(np.unique(before.reshape(-1, 3), axis=0)) > 200  # not a blank page
@@ -69,7 +71,7 @@ def test_the_page_edits_the_file_and_asks_nobody_else(studio, browser, tmp_path)
     tip = float(rows.min() + 12)
     x = float(np.median(columns[np.abs(rows - tip) < 4]))
     browser.drag((x, tip), (x, tip - 60))
-    until(lambda: page.session.text != STARTER)
+    until(lambda: page.session.text != CAPSULE)
     first, second = page.session.understood.written.motion
     assert first.position == (0.09, 0.0, 0.3)
     assert second.position[:2] == (0.09, 0.02)
@@ -104,9 +106,9 @@ def test_the_page_edits_the_file_and_asks_nobody_else(studio, browser, tmp_path)
     browser.wait('!document.querySelector(".studio .bad")')
 
     # The file.
-    assert not page.session.path.exists()
+    assert page.session.path.read_text(encoding="utf-8") == CAPSULE
     browser.evaluate("[...document.querySelectorAll('button')].find((e) => e.textContent === 'save').click()")
-    until(page.session.path.exists)
+    until(lambda: page.session.path.read_text(encoding="utf-8") != CAPSULE)
     task = load_task(page.session.path)
     assert task.object.mass == 0.25
     assert task.motion[1].position == second.position
