@@ -71,7 +71,7 @@ class Record:
         self._unmet: dict[str, tuple[Reason, ...]] = {}
 
     def placed(self, task: Task, placement: dict[str, Any], written: bool) -> Record:
-        """A record of the same task with its contacts placed, whose time has begun with this one.
+        """A record of the same task with its contacts placed, which goes on with the time and the runs of this one.
 
         Args:
             task: with its contacts in place.
@@ -81,7 +81,7 @@ class Record:
         keeper = self.keeper if written else None
         record = Record(task, keeper, self.report, self.own_terms, self.journal, self.scratch)
         record.started = self.started
-        record.update(task=task, placement=placement, seconds=dict(self.design.seconds))
+        record.update(task=task, placement=placement, stages=self.design.stages, seconds=self.design.seconds)
         return record
 
     def log(self, stage: str, text: str) -> None:

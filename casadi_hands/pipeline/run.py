@@ -162,10 +162,10 @@ def _design_placed(record: Record, until: str, workers: Executor | None, jobs: i
     tasks, told = place(record.task, record, workers)
     if not tasks:
         return record.keep(unplaceable(record, told), last=True)
-    best: Design | None = None
+    own, best = record, None
     for number, task in enumerate(tasks[: ATTEMPTS if until == STAGES[-1] else 1]):
         # The first is written as it grows; what a second leaves half done shall not replace it.
-        own = record.placed(task, {**told, "chosen": number}, written=number == 0)
+        own = own.placed(task, {**told, "chosen": number}, written=number == 0)
         model = _model(own)
         try_out(model, task.search.max_joints)
         seen = findings(task, model)
@@ -173,11 +173,11 @@ def _design_placed(record: Record, until: str, workers: Executor | None, jobs: i
             design = replace(own.design, reason=format_reasons(never))
         else:
             design = _doubted(_design(own, until, workers, jobs), format_reasons(each.reason for each in seen), until)
-        design = own.complete(design)
         best = design if best is None else min(best, design, key=_rank)
         if best.status == "certified":
             break
     assert best is not None
+    best = own.complete(best)
     record.keeper.keep(best, last=True)
     return best
 

@@ -72,7 +72,10 @@ def solved_as(monkeypatch: pytest.MonkeyPatch, *statuses: str) -> list[Task]:
 
     def design(record: Record, *_: Any) -> Design:
         tasks.append(record.task)
-        return replace(record.design, status=left.pop(0), reason="")
+        number, status = record.journal.once("design", lambda: (len(statuses) - len(left), left.pop(0)))
+        with record.stage("refine", f"design {number + 1}"):
+            record.add_runs([{"stage": "refine", "what": f"design {number + 1}", "seconds": 0.0}])
+        return replace(record.design, status=status, reason="")
 
     monkeypatch.setattr(run, "_design", design)
     monkeypatch.setattr(placing, "try_contacts", lambda _: Tried((1, 1, 1), held=True))
@@ -101,6 +104,18 @@ def test_the_next_set_where_the_first_is_not_certified(
     assert len(tasks) == 2
     assert design.task.fingers == tasks[chosen].fingers
     assert Design.load(tmp_path).placement["chosen"] == chosen
+
+
+@pytest.mark.parametrize("statuses", [("feasible", "certified"), ("feasible", "failed")])
+def test_both_designs_runs_and_times_are_told_whichever_is_taken(
+    statuses: tuple[str, str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    began: list[float] = []
+    solved_as(monkeypatch, *statuses)
+    design = solve(ball(), jobs=1, out=tmp_path, progress=lambda news: began.append(news.elapsed))
+    assert [run["what"] for run in design.stages] == ["design 1", "design 2"]
+    assert Design.load(tmp_path).stages == design.stages
+    assert design.seconds["total"] >= began[-1]
 
 
 def test_what_cannot_be_placed_fails_with_its_reason(tmp_path: Path) -> None:
