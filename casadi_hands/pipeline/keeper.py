@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Set
 from pathlib import Path
 
 from casadi_hands.errors import DesignError
@@ -78,7 +78,7 @@ def rival_in(out: Path, task: Task, force: bool = False) -> Design | None:
         if force:
             return None
         raise DesignError(f"{shown(out)}: holds a result that cannot be read ({error})", _REMEDY) from error
-    same = _asked(found.task) == _asked(task)
+    same = _is_asked_for(found.task, task)
     if not force and (found.status == "certified" or (not same and found.status != "failed")):
         which = "this task" if same else f"another task ({found.task.name})"
         raise DesignError(f"{shown(out)}: holds a {found.status} result of {which} already", _REMEDY)
@@ -89,18 +89,26 @@ def rival_in(out: Path, task: Task, force: bool = False) -> Design | None:
 _REMEDY = "--force replaces it when there is another, --out names another folder"
 
 
-def _asked(task: Task) -> Task:
-    """What a task asks for, however it is looked for."""
+_HOW = ("search", "weights")
+
+
+def _is_asked_for(found: Task, task: Task) -> bool:
+    """Whether a result's task is what a task asks for: the same, however it is looked for, less fingers to spare."""
+    spare = {name for name, each in task.fingers.items() if each.optional} - found.fingers.keys()
+    return _asked(found) == _asked(task, spare)
+
+
+def _asked(task: Task, spare: Set[str] = frozenset()) -> Task:
+    """What a task asks for, contacts as they were before they were placed, without some fingers to spare."""
     default = Task.model_fields
     how = {name: default[name].get_default(call_default_factory=True) for name in _HOW}
     fingers = {
-        name: each if each.placed is None else each.model_copy(update={"touches": each.placed, "placed": None})
+        # Of one that was placed nobody knows whether it was to spare.
+        name: each.model_copy(update={"touches": each.placed or each.touches, "placed": None, "optional": None})
         for name, each in task.fingers.items()
+        if name not in spare
     }
     return task.model_copy(update={**how, "fingers": fingers})
-
-
-_HOW = ("search", "weights")
 
 
 def _standing(design: Design) -> tuple[float, ...]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from casadi_hands.errors import SolveError
+from casadi_hands.errors import DesignError, SolveError
 from casadi_hands.execution.processes import processes
 from casadi_hands.export.design import Design
 from casadi_hands.pipeline import placing, run, solve
@@ -116,6 +116,24 @@ def test_both_designs_runs_and_times_are_told_whichever_is_taken(
     assert [run["what"] for run in design.stages] == ["design 1", "design 2"]
     assert Design.load(tmp_path).stages == design.stages
     assert design.seconds["total"] >= began[-1]
+
+
+NEAR = "{touches: {near: [0, 0.03, 0], within: 0.02}}"
+
+
+@pytest.mark.parametrize("fingers", ["3", "{count: [2, 6]}", f"{{a: {NEAR}, b: {{touches: anywhere}}}}"])
+def test_a_certified_result_is_of_the_task_that_asked_for_its_contacts(
+    fingers: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    solved_as(monkeypatch, "certified")
+    kept = solve(ball(fingers), jobs=1, out=tmp_path).task
+    assert len(kept.fingers) < 6
+    for same in (ball(fingers), kept):
+        with pytest.raises(DesignError, match="holds a certified result of this task already; --force"):
+            solve(same, jobs=1, out=tmp_path)
+    for other in ("5", f"{{finger1: {NEAR}, b: {{touches: anywhere}}}}"):
+        with pytest.raises(DesignError, match="holds a certified result of another task"):
+            solve(ball(other), jobs=1, out=tmp_path)
 
 
 def test_what_cannot_be_placed_fails_with_its_reason(tmp_path: Path) -> None:
