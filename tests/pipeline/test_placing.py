@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from casadi_hands import explore
 from casadi_hands.errors import DesignError, SolveError
 from casadi_hands.execution.processes import processes
 from casadi_hands.export.design import Design
@@ -15,8 +16,10 @@ from casadi_hands.pipeline import placing, run, solve
 from casadi_hands.pipeline.formulate import formulate
 from casadi_hands.pipeline.placing import Tried, place, placed_like
 from casadi_hands.pipeline.record import Record
+from casadi_hands.pipeline.unfinished import stopped_solve
 from casadi_hands.placement.place import propose
 from casadi_hands.task import Task, parse_task
+from tests.pipeline.test_resume import StoppedError, content, stopping_at
 
 TASK = """\
 name: ball
@@ -134,6 +137,44 @@ def test_a_certified_result_is_of_the_task_that_asked_for_its_contacts(
     for other in ("5", f"{{finger1: {NEAR}, b: {{touches: anywhere}}}}"):
         with pytest.raises(DesignError, match="holds a certified result of another task"):
             solve(ball(other), jobs=1, out=tmp_path)
+
+
+@pytest.mark.parametrize("words", ["set 2, 2 of", "design 1", "design 2"])
+def test_a_stopped_solve_goes_on_to_the_same_files(words: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def pretend() -> list[Task]:
+        """What is done twice finds no outcome left."""
+        designed = solved_as(monkeypatch, "feasible", "certified")
+        joints = range(len(propose(ball()).sets), 0, -1)
+        tried_as(monkeypatch, *[Tried((n, 1, 1), held=True) for n in joints])
+        return designed
+
+    whole, out = tmp_path / "whole", tmp_path / "out"
+    pretend()
+    solve(ball(), jobs=1, out=whole)
+    designed = pretend()
+    with pytest.raises(StoppedError):
+        solve(ball(), jobs=1, out=out, progress=stopping_at(words))
+    task, _ = stopped_solve(out)
+    assert task == ball()
+    solve(task, jobs=1, out=out, resume=True)
+    assert content(out) == content(whole)
+    assert content(out)["placement.json"]
+    assert len({str(each.fingers) for each in designed}) == 2
+    assert {each.name for each in tmp_path.iterdir()} == {"whole", "out"}
+
+
+def test_a_stopped_exploration_keeps_the_contacts_that_were_placed(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    whole, out = tmp_path / "whole", tmp_path / "out"
+    solved_as(monkeypatch, "certified", "certified")
+    explore(ball(), seeds=[0, 1], jobs=1, out=whole)
+    solved_as(monkeypatch, "certified", "certified")
+    with pytest.raises(StoppedError):
+        explore(ball(), seeds=[0, 1], jobs=1, out=out, progress=stopping_at("placement: seed 1"))
+    ranked = explore(ball(), seeds=[0, 1], jobs=1, out=out, resume=True)
+    assert all(one.design.task.is_placed for one in ranked)
+    assert content(out) == content(whole)
 
 
 def test_what_cannot_be_placed_fails_with_its_reason(tmp_path: Path) -> None:

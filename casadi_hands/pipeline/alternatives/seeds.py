@@ -110,7 +110,7 @@ def _explored(
         told = _within(report, seed, time.perf_counter() - began)
         unit = journal.section(f"seed {seed}")
         if folder is not None and unit.has(0):
-            designs[seed] = replace(unit.get(0), task=_with_seed(task, seed))
+            designs[seed] = replace(unit.get(0), task=Design.load(folder).task)  # whose contacts may have been placed
             continue
         goes_on = folder is not None and is_unfinished(folder)
         try:
