@@ -120,43 +120,48 @@ def solve(
 
 def _solve(record: Record, until: str, start: Path | None, executor: Executor | None, jobs: int) -> Design:
     """The design, written if there is a place for it."""
-    task = record.task
-    model = _model(record)
-    if task.is_placed:
-        try_out(model, task.search.max_joints)
     if until in STAGES[2:]:
         load_mujoco()  # before hours of work, not after them
-    seen = findings(task, model)
-    if never := [each.reason for each in seen if each.certain]:
-        return record.keep(replace(record.design, reason=format_reasons(never)), last=True)
-    doubts = format_reasons(each.reason for each in seen)
-    if doubts:
-        record.log("check", doubts)
     with processes(jobs) if executor is None else nullcontext(executor) as workers:
-        if not task.is_placed:
+        if not record.task.is_placed:
             return _design_placed(record, until, workers, jobs)
-        return record.keep(_doubted(_design(record, until, workers, jobs, start), doubts, until), last=True)
+        return record.keep(_design(record, until, workers, jobs, start), last=True)
 
 
-def _doubted(design: Design, doubts: str, until: str) -> Design:
-    """The design; where it is not certified, with what the task alone says against it."""
+def _design(record: Record, until: str, workers: Executor | None, jobs: int, start: Path | None = None) -> Design:
+    """The design of a task whose contacts have their places."""
+    model = _model(record)
+    try_out(model, record.task.search.max_joints)
+    impossible, doubts = _checked(record, model)
+    if impossible is not None:
+        return impossible
+    try:
+        design = None if start is None else _refine_again(record, model, start)
+        design = counted(design or _run(record, until, workers, jobs))
+    except SolverError as error:
+        _LOG.debug("the solve broke off", exc_info=True)
+        design = counted(record.broken_off(error))
     if not doubts or until != STAGES[-1] or design.status == "certified":
         return design
     return replace(design, reason=f"{design.reason}. The task alone says that {doubts}")
 
 
-def _design(record: Record, until: str, workers: Executor | None, jobs: int, start: Path | None = None) -> Design:
-    """The design of a task whose contacts have their places."""
-    try:
-        design = None if start is None else _refine_again(record, start)
-        return counted(design or _run(record, until, workers, jobs))
-    except SolverError as error:
-        _LOG.debug("the solve broke off", exc_info=True)
-        return counted(record.broken_off(error))
+def _checked(record: Record, model: Model) -> tuple[Design | None, str]:
+    """What the task alone shows: the failed design where no hand can do it, and what else speaks against it."""
+    seen = findings(record.task, model)
+    if never := [each.reason for each in seen if each.certain]:
+        return replace(record.design, reason=format_reasons(never)), ""
+    doubts = format_reasons(each.reason for each in seen)
+    if doubts:
+        record.log("check", doubts)
+    return None, doubts
 
 
 def _design_placed(record: Record, until: str, workers: Executor | None, jobs: int) -> Design:
     """Place contacts, then design; where that gives no certified hand, with the next best contacts, too."""
+    impossible, _ = _checked(record, _model(record))
+    if impossible is not None:
+        return record.keep(impossible, last=True)
     if workers is not None:
         start_up(workers, jobs)
     tasks, told = place(record.task, record, workers)
@@ -166,13 +171,7 @@ def _design_placed(record: Record, until: str, workers: Executor | None, jobs: i
     for number, task in enumerate(tasks[: ATTEMPTS if until == STAGES[-1] else 1]):
         # The first is written as it grows; what a second leaves half done shall not replace it.
         own = own.placed(task, {**told, "chosen": number}, written=number == 0)
-        model = _model(own)
-        try_out(model, task.search.max_joints)
-        seen = findings(task, model)
-        if never := [each.reason for each in seen if each.certain]:
-            design = replace(own.design, reason=format_reasons(never))
-        else:
-            design = _doubted(_design(own, until, workers, jobs), format_reasons(each.reason for each in seen), until)
+        design = _design(own, until, workers, jobs)
         best = design if best is None else min(best, design, key=_rank)
         if best.status == "certified":
             break
@@ -187,12 +186,11 @@ def _rank(design: Design) -> tuple[float, ...]:
     return STATUSES.index(design.status), *rank_of(design)
 
 
-def _refine_again(record: Record, start: Path) -> Design | None:
+def _refine_again(record: Record, model: Model, start: Path) -> Design | None:
     """The hand and the motion of an earlier result, refined for the task as it is now; None if another is needed.
 
     Motors that share joints are looked for anew, from a motor for every joint.
     """
-    model = _model(record)
 
     def begin() -> tuple[WholeHand, Margin | None]:
         earlier = Design.load(start)
