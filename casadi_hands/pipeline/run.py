@@ -199,12 +199,15 @@ def _refine_again(record: Record, model: Model, start: Path) -> Design | None:
     whole, margin = record.journal.once("start", begin)
     adopt(record, model, whole)
     judge = Judge(model, as_floating(model, whole), record.scratch)
-    # Replays of one hand take about as long as other processes take to start.
-    design, _ = Refiner(record, model, judge, jobs=1).certify(whole, (), margin, near=True)
-    record.update(stages=[{**run, "started_from": str(start)} for run in record.design.stages])
-    record.update_best(design)
-    if design.status == "certified":
-        design = Coupler(record, model, judge, 1).run(design)
+    try:
+        # Replays of one hand take about as long as other processes take to start.
+        design, _ = Refiner(record, model, judge, jobs=1).certify(whole, (), margin, near=True)
+        record.update(stages=[{**run, "started_from": str(start)} for run in record.design.stages])
+        record.update_best(design)
+        if design.status == "certified":
+            design = Coupler(record, model, judge, 1).run(design)
+    except SolverError as error:
+        design = record.broken_off(error)
     if design.status == "certified":
         return design
     record.log("refine", f"from the earlier result no hand is certified: {design.reason}; now all stages")

@@ -112,6 +112,21 @@ def test_where_it_does_not_serve_all_stages_are_run_and_know_of_it(
     assert any(words in word.text for word in news)
 
 
+def test_where_its_refinement_breaks_off_all_stages_are_run(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def breaks(*_: Any, **__: Any) -> Any:
+        raise SolverError("IPOPT: no memory left")
+
+    def all_stages(record: Record, until: str, executor: Any, jobs: int) -> Design:
+        assert (record.design.hand, record.design.motion) == (None, None)
+        return replace(record.design, status="certified", reason="")
+
+    monkeypatch.setattr(Refiner, "certify", breaks)
+    monkeypatch.setattr(run, "_run", all_stages)
+    news: list[Progress] = []
+    assert solve(parse_task(HELD), jobs=1, start=folder, progress=news.append).status == "certified"
+    assert any("no hand is certified: the solve broke off: IPOPT: no memory left" in word.text for word in news)
+
+
 def test_where_motors_out_of_reach_keep_the_earlier_hand_from_its_certificate_all_stages_are_run(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
