@@ -16,6 +16,11 @@ class HandsError(Exception):
         super().__init__(printable(str(message)))
 
 
+def words_of(error: BaseException) -> str:
+    """All that an error says: its message and the notes behind it, a line each."""
+    return "\n".join([str(error), *getattr(error, "__notes__", ())])
+
+
 def printable(text: str) -> str:
     """Text with what would command a terminal escaped, and its middle left out where it is too long."""
     text = "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in text[: 20 * LONGEST_MESSAGE])

@@ -19,10 +19,10 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):  # where a terminal knows fewer characters than are printed
             stream.reconfigure(errors="backslashreplace")
     from casadi_hands.cli.app import app
-    from casadi_hands.errors import HandsError
+    from casadi_hands.errors import HandsError, words_of
 
     try:
         app()
     except HandsError as error:
-        print("\n".join([f"casadi-hands: {error}", *getattr(error, "__notes__", ())]), file=sys.stderr)
+        print(f"casadi-hands: {words_of(error)}", file=sys.stderr)
         sys.exit(2)

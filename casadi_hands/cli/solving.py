@@ -16,7 +16,7 @@ from casadi_hands.cli.history import Clock, kind_of, remember, remembered
 from casadi_hands.cli.interrupt import leave_on_interrupt
 from casadi_hands.cli.progress import Reporter
 from casadi_hands.cli.summary import alternatives_summary, design_summary, headline
-from casadi_hands.errors import HandsError
+from casadi_hands.errors import HandsError, words_of
 from casadi_hands.task import Task
 from casadi_hands.task.loader import load_questioned
 
@@ -56,7 +56,7 @@ def solve_and_tell(asked: Asked) -> int:
         return _solve_and_tell(asked)
     except HandsError as error:
         if asked.as_json:
-            Events().write("error", text=str(error))
+            Events().write("error", text=words_of(error))
         raise
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from casadi_hands.cli.history import Solve, kind_of, remember, remembered
-from casadi_hands.errors import SolveError
+from casadi_hands.errors import ELSEWHERE, DesignError, SolveError
 from tests.cli.test_app import run, solve_gives, task_file  # noqa: F401
 from tests.export.example import example_design, example_task
 
@@ -114,6 +114,15 @@ def test_json_tells_errors_too(
     last = events(found.stdout)[-1]
     assert last["event"] == "error"
     assert last["text"].startswith("no.yaml: no such file" if name else "the task allows no hand")
+
+
+def test_json_tells_what_to_do_about_an_error_too(
+    task_file: Path,  # noqa: F811
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    solve_gives(monkeypatch, DesignError("out: cannot write the design here", ELSEWHERE))
+    (*_, last) = events(run("solve", task_file, "--json").stdout)
+    assert last == {"event": "error", "text": f"out: cannot write the design here\n{ELSEWHERE}"}
 
 
 def test_quiet_and_json_do_not_go_together(task_file: Path) -> None:  # noqa: F811
