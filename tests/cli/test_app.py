@@ -40,13 +40,6 @@ class News:
     elapsed: float
 
 
-@pytest.fixture
-def task_file(tmp_path: Path) -> Path:
-    path = tmp_path / "carry.yaml"
-    path.write_text(TASK)
-    return path
-
-
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     return carried(tmp_path_factory.mktemp("task"))

@@ -13,7 +13,6 @@ from typer.testing import CliRunner
 
 from casadi_hands.cli import main
 from casadi_hands.cli.app import app
-from tests.stages.synthesis.example import BALL
 
 
 @dataclass(frozen=True)
@@ -23,26 +22,19 @@ class News:
     elapsed: float
 
 
-@pytest.fixture
-def task_file(tmp_path: Path) -> Path:
-    path = tmp_path / "ball.yaml"
-    path.write_text(BALL)
-    return path
-
-
 def run(*arguments: Any) -> Any:
     return CliRunner().invoke(app, ["formulate", *map(str, arguments)])
 
 
-def test_it_writes_a_folder_and_prints_where_its_page_is(task_file: Path, tmp_path: Path) -> None:
-    done = run(task_file, "--stage", "floating", "--out", tmp_path / "program")
+def test_it_writes_a_folder_and_prints_where_its_page_is(ball_file: Path, tmp_path: Path) -> None:
+    done = run(ball_file, "--stage", "floating", "--out", tmp_path / "program")
     assert (done.exit_code, done.stdout) == (0, f"{tmp_path / 'program' / 'index.html'}\n")
     assert "object's motion with 2 floating contacts" in done.stderr
     record = json.loads((tmp_path / "program" / "program.json").read_text(encoding="utf-8"))
     assert (record["stage"], record["step"], record["seed"]) == ("floating", "free", 0)
 
 
-def test_options_are_handed_on(task_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_options_are_handed_on(ball_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[tuple[Any, ...]] = []
 
     class Saved:
@@ -55,28 +47,28 @@ def test_options_are_handed_on(task_file: Path, tmp_path: Path, monkeypatch: pyt
         return Saved()
 
     monkeypatch.setattr("casadi_hands.pipeline.formulate.formulate", formulate)
-    done = run(task_file, "--out", tmp_path)
+    done = run(ball_file, "--out", tmp_path)
     assert done.stdout == f"{tmp_path / 'page'}\n"
     assert "thinking" in done.stderr
-    run(task_file, "--out", tmp_path, "--stage", "whole_hand", "--seed", 4, "--jobs", 2)
+    run(ball_file, "--out", tmp_path, "--stage", "whole_hand", "--seed", 4, "--jobs", 2)
     assert [call[1:] for call in calls] == [("refine", None, None), ("whole_hand", 4, 2)]
     assert set(calls[0][0]) == {"left", "right"}
 
 
 @pytest.mark.parametrize("wrong", [["--stage", "refined", "--out", "d"], ["--seed", "-1", "--out", "d"], []])
 def test_a_wrong_option_exits_2_and_runs_nothing(
-    wrong: list[str], task_file: Path, monkeypatch: pytest.MonkeyPatch
+    wrong: list[str], ball_file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("casadi_hands.task.load_task", lambda _: pytest.fail("loaded"))
-    assert run(task_file, *wrong).exit_code == 2
+    assert run(ball_file, *wrong).exit_code == 2
 
 
 def test_a_task_that_is_none_and_a_file_in_the_way_are_one_message(
-    task_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    ball_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("PYTHONWARNINGS", "default")  # which the command changes for what it starts
-    for task, message in ((tmp_path / "no.yaml", "no such file"), (task_file, "cannot write the program here")):
-        arguments = ["formulate", str(task), "--stage", "floating", "--out", str(task_file)]
+    for task, message in ((tmp_path / "no.yaml", "no such file"), (ball_file, "cannot write the program here")):
+        arguments = ["formulate", str(task), "--stage", "floating", "--out", str(ball_file)]
         monkeypatch.setattr(sys, "argv", ["casadi-hands", *arguments])
         with pytest.raises(SystemExit) as exit_:
             main()

@@ -23,27 +23,19 @@ from casadi_hands.export.place import beside
 from casadi_hands.pipeline.unfinished import Request
 from casadi_hands.task import parse_task
 from tests.export.example import TASK, example_design
-from tests.test_pipeline import BALL
 
 MAIN = [sys.executable, "-c", "from casadi_hands.cli import main; main()", "solve"]
-
-
-@pytest.fixture
-def task_file(tmp_path: Path) -> Path:
-    path = tmp_path / "ball.yaml"
-    path.write_text(BALL)
-    return path
 
 
 def run(*arguments: Any) -> Any:
     return CliRunner().invoke(app, ["solve", *(str(argument) for argument in arguments)])
 
 
-def started(task_file: Path, out: Path, temporary: Path) -> subprocess.Popen[str]:
+def started(ball_file: Path, out: Path, temporary: Path) -> subprocess.Popen[str]:
     """A solve with two workers, that has finished a unit of its search."""
     temporary.mkdir()
     process = subprocess.Popen(
-        [*MAIN, str(task_file), "--out", str(out), "--jobs", "2"],
+        [*MAIN, str(ball_file), "--out", str(out), "--jobs", "2"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -66,10 +58,10 @@ def left_of(session: int) -> list[str]:
 
 @pytest.mark.parametrize("sign", [signal.SIGTERM, signal.SIGKILL])
 def test_all_its_processes_end_with_it_and_nothing_temporary_stays(
-    sign: signal.Signals, task_file: Path, tmp_path: Path
+    sign: signal.Signals, ball_file: Path, tmp_path: Path
 ) -> None:
     out, temporary = tmp_path / "out", tmp_path / "tmp"
-    process = started(task_file, out, temporary)
+    process = started(ball_file, out, temporary)
     assert len(left_of(process.pid)) >= 3
     process.send_signal(sign)
     last = time.monotonic() + 2
@@ -92,7 +84,7 @@ def test_all_its_processes_end_with_it_and_nothing_temporary_stays(
     # It ended before a hand was designed, and left what there was, whole.
     assert Design.load(out).motion is not None
     # Who comes next clears the rest away.
-    assert run(task_file, "--out", out, "--jobs", 1, "--until", "floating").exit_code == 0
+    assert run(ball_file, "--out", out, "--jobs", 1, "--until", "floating").exit_code == 0
     assert {each.name for each in tmp_path.iterdir()} == {"ball.yaml", "out", "tmp"}
 
 
@@ -111,8 +103,8 @@ main()
 """
 
 
-def test_one_that_cannot_heed_a_signal_is_ended_all_the_same(task_file: Path, tmp_path: Path) -> None:
-    command = [sys.executable, "-c", BUSY, str(task_file), "--out", str(tmp_path / "out")]
+def test_one_that_cannot_heed_a_signal_is_ended_all_the_same(ball_file: Path, tmp_path: Path) -> None:
+    command = [sys.executable, "-c", BUSY, str(ball_file), "--out", str(tmp_path / "out")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout
         assert process.stdout.readline() == "solving\n"
@@ -121,12 +113,12 @@ def test_one_that_cannot_heed_a_signal_is_ended_all_the_same(task_file: Path, tm
         assert process.wait(timeout=10) == -signal.SIGKILL
 
 
-def test_a_full_disk_is_one_message_and_leaves_no_empty_files(task_file: Path, tmp_path: Path) -> None:
+def test_a_full_disk_is_one_message_and_leaves_no_empty_files(ball_file: Path, tmp_path: Path) -> None:
     def small_files() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))  # the page is larger
 
     found = subprocess.run(
-        [*MAIN, str(task_file), "--out", str(tmp_path / "out"), "--jobs", "1", "--until", "floating"],
+        [*MAIN, str(ball_file), "--out", str(tmp_path / "out"), "--jobs", "1", "--until", "floating"],
         capture_output=True,
         text=True,
         check=False,
@@ -145,18 +137,18 @@ def test_a_full_disk_is_one_message_and_leaves_no_empty_files(task_file: Path, t
     [("n" * 300, "File name too long"), ("ball.yaml", "it is a file"), ("ball.yaml/out", "Not a directory")],
 )
 def test_a_folder_that_cannot_be_is_refused_at_once(
-    name: str, words: str, task_file: Path, monkeypatch: pytest.MonkeyPatch
+    name: str, words: str, ball_file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("casadi_hands.pipeline.run._solve", lambda *_: pytest.fail("it was solved"))
-    found = run(task_file, "--out", task_file.parent / name)
+    found = run(ball_file, "--out", ball_file.parent / name)
     assert isinstance(found.exception, DesignError)  # of which `main` makes a message and exit status 2
     assert f"cannot write the design here: {words}" in str(found.exception)
     assert len(str(found.exception)) < 300
 
 
-def test_a_certified_result_is_named_with_the_way_to_replace_it(task_file: Path, tmp_path: Path) -> None:
+def test_a_certified_result_is_named_with_the_way_to_replace_it(ball_file: Path, tmp_path: Path) -> None:
     replace(example_design(), status="certified").save(tmp_path / "out")
-    found = run(task_file, "--out", tmp_path / "out")
+    found = run(ball_file, "--out", tmp_path / "out")
     assert isinstance(found.exception, DesignError)
     assert "holds a certified result of another task (move a capsule & back) already" in str(found.exception)
     assert "--force" in found.exception.__notes__[0]

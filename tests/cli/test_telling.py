@@ -12,7 +12,7 @@ import pytest
 
 from casadi_hands.cli.history import Solve, kind_of, remember, remembered
 from casadi_hands.errors import ELSEWHERE, DesignError, SolveError
-from tests.cli.test_app import run, solve_gives, task_file  # noqa: F401
+from tests.cli.test_app import run, solve_gives
 from tests.export.example import example_design, example_task
 
 
@@ -28,7 +28,7 @@ def events(output: str) -> list[dict[str, Any]]:
 
 
 def test_the_time_left_is_told_where_it_is_known(
-    task_file: Path,  # noqa: F811
+    task_file: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     solve_gives(monkeypatch, example_design())
@@ -39,7 +39,7 @@ def test_the_time_left_is_told_where_it_is_known(
 
 
 def test_a_solve_is_remembered_with_when_its_stages_began(
-    task_file: Path,  # noqa: F811
+    task_file: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     solve_gives(monkeypatch, example_design())
@@ -50,7 +50,7 @@ def test_a_solve_is_remembered_with_when_its_stages_began(
 
 
 def test_quiet_prints_the_verdict_alone(
-    task_file: Path,  # noqa: F811
+    task_file: Path,
     monkeypatch: pytest.MonkeyPatch,
     tmp_path: Path,
 ) -> None:
@@ -60,7 +60,7 @@ def test_quiet_prints_the_verdict_alone(
 
 
 def test_json_is_a_line_an_event(
-    task_file: Path,  # noqa: F811
+    task_file: Path,
     monkeypatch: pytest.MonkeyPatch,
     tmp_path: Path,
 ) -> None:
@@ -91,7 +91,7 @@ def test_json_is_a_line_an_event(
 
 
 def test_json_asks_the_questions_about_the_file(
-    task_file: Path,  # noqa: F811
+    task_file: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     solve_gives(monkeypatch, example_design())
@@ -105,7 +105,7 @@ def test_json_asks_the_questions_about_the_file(
 @pytest.mark.parametrize("name", ["no.yaml", None])
 def test_json_tells_errors_too(
     name: str | None,
-    task_file: Path,  # noqa: F811
+    task_file: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     solve_gives(monkeypatch, SolveError("the task allows no hand"))
@@ -117,7 +117,7 @@ def test_json_tells_errors_too(
 
 
 def test_json_tells_what_to_do_about_an_error_too(
-    task_file: Path,  # noqa: F811
+    task_file: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     solve_gives(monkeypatch, DesignError("out: cannot write the design here", ELSEWHERE))
@@ -125,5 +125,5 @@ def test_json_tells_what_to_do_about_an_error_too(
     assert last == {"event": "error", "text": f"out: cannot write the design here\n{ELSEWHERE}"}
 
 
-def test_quiet_and_json_do_not_go_together(task_file: Path) -> None:  # noqa: F811
+def test_quiet_and_json_do_not_go_together(task_file: Path) -> None:
     assert run("solve", task_file, "--json", "--quiet").exit_code == 2
