@@ -57,7 +57,7 @@ class Reporter:
 
     def note(self, text: str) -> None:
         """Say something of the program's own, which stays on the screen."""
-        self._console.print(self._line(self._elapsed, "", text))
+        self._console.print(self._line(self._elapsed, "", text), soft_wrap=True)  # paths are to be copied
 
     def progress(self, news: Progress) -> None:
         """Take the news of the solve."""

@@ -80,7 +80,7 @@ def _solve_and_tell(asked: Asked) -> int:
     clock = _clock(problem, asked, seeds)
     console = Console(stderr=True, quiet=asked.quiet)
     reporter = Events(questions, clock) if asked.as_json else Reporter(console, questions, clock)
-    with leave_on_interrupt(lambda: _stopped(reporter, folder)), reporter:
+    with leave_on_interrupt(lambda: _stopped(reporter, folder, seeds is not None)), reporter:
         # Within the reporter, because CasADi and Pinocchio take seconds to load.
         design, ranked = _solved(problem, folder, seeds, asked, reporter)
         from casadi_hands.pipeline.unfinished import is_unfinished
@@ -158,16 +158,19 @@ def _as_stopped(asked: Asked, folder: Path) -> tuple[Task, Path, tuple[int, ...]
     return problem, folder, request.seeds, replace(asked, until=request.until, start=start, force=force)
 
 
-def _stopped(reporter: Reporter | Events, folder: Path) -> None:
+def _stopped(reporter: Reporter | Events, folder: Path, explores: bool) -> None:
     """Last words before the program ends at once."""
     reporter.stop()
-    # Written last, so a folder that has it is complete.
-    complete = any(folder.glob("result.json")) or any(folder.glob("alternatives/*/result.json"))
-    goes_on = False
+    # Written last, so a folder that has it is complete; what an exploration finds there of its seeds is its own.
+    complete, own, goes_on = (folder / "result.json").exists(), False, False
     with suppress(Exception):  # it may have been loading
-        from casadi_hands.pipeline.unfinished import is_unfinished, leave_unfinished
+        from casadi_hands.pipeline.unfinished import has_written, is_unfinished, leave_unfinished
 
+        own = has_written(folder) or (explores and any(folder.glob("alternatives/*/result.json")))
         leave_unfinished()
         goes_on = is_unfinished(folder)
-    words = f"what was computed is in {folder}" if complete else "no stage was complete"
+    if own:
+        words = f"what was computed is in {folder}"
+    else:
+        words = f"the result in {folder} is an earlier one" if complete else "no stage was complete"
     reporter.note(f"stopped; {words}{f'; go on with: casadi-hands solve --resume {folder}' if goes_on else ''}")

@@ -150,6 +150,11 @@ def is_unfinished(directory: Path) -> bool:
     return _read(place) is not None and any((place / _UNITS).glob("*.npz"))
 
 
+def has_written(directory: Path) -> bool:
+    """Whether a solve into a folder that has not ended has written its own result there."""
+    return Unfinished(beside(resolved(directory))).has_written
+
+
 def request_hash(task: Task) -> str:
     """SHA-256 of a task as solved, hexadecimal."""
     return hashlib.sha256(task_to_yaml(task).encode()).hexdigest()

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
 import time
 import webbrowser
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from casadi_hands.cli import main
 from casadi_hands.cli.app import Stage, app
 from casadi_hands.export.design import Design
 from casadi_hands.export.mjcf import scene_mjcf
+from casadi_hands.pipeline import Progress
 from casadi_hands.pipeline.alternatives import Alternative
 from casadi_hands.task import load_task
 from casadi_hands.verify import Perturbation, Replay, Replays
@@ -31,13 +33,6 @@ from tests.verify.fixture import Scene, carried
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 CAPSULE = PROBLEMS / "horizontal_translation.yaml"
-
-
-@dataclass(frozen=True)
-class News:
-    stage: str
-    text: str
-    elapsed: float
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +56,7 @@ def solve_gives(monkeypatch: pytest.MonkeyPatch, outcome: Any) -> list[dict[str,
             ("floating", "six seconds later", 6.0),
             ("synthesis", "finger [thumb], 2 joints", 6.5),
         ):
-            settings["progress"](News(stage, text, elapsed))
+            settings["progress"](Progress(stage, text, elapsed))
         if isinstance(outcome, BaseException):
             raise outcome
         return outcome
@@ -336,20 +331,28 @@ def test_progress_comes_in_lines_at_a_modest_rate(task_file: Path, monkeypatch: 
 
 
 ENDLESS = """
+import os
 import sys
 import casadi as ca
 import casadi_hands.pipeline
 from casadi_hands.cli import main
+from casadi_hands.export.design import Design
+from casadi_hands.export.place import owned
+from casadi_hands.pipeline.keeper import Keeper
+from casadi_hands.pipeline.unfinished import Unfinished
 
-def solve(task, **settings):
+def solve(task, out, **settings):
     x = ca.SX.sym("x", 300)
     cost = ca.sumsqr(ca.sin(3 * x[1:]) - x[:-1] ** 2) + ca.sumsqr(ca.cos(10 * x))
     options = {"print_time": False, "ipopt.print_level": 0, "ipopt.max_iter": 1000, "ipopt.tol": 1e-30}
     options |= {"ipopt.acceptable_tol": 1e-30, "ipopt.hessian_approximation": "limited-memory"}
     solver = ca.nlpsol("solver", "ipopt", {"x": x, "f": cost}, options)
-    print("solving", flush=True)
-    while True:
-        solver(x0=ca.linspace(0, 30, 300))
+    with owned(out) as place:
+        if "EARLIER" in os.environ:
+            Keeper(out, before=Unfinished(place).wrote).keep(Design.load(os.environ["EARLIER"]))
+        print("solving", flush=True)
+        while True:
+            solver(x0=ca.linspace(0, 30, 300))
 
 casadi_hands.pipeline.solve = solve
 sys.argv = ["casadi-hands", "solve", *sys.argv[1:]]
@@ -357,20 +360,34 @@ main()
 """
 
 
-@pytest.mark.parametrize(("written", "words"), [(False, "no stage was complete"), (True, "what was computed is in")])
+@pytest.mark.parametrize(
+    ("there", "writes", "words"),
+    [
+        (False, False, "no stage was complete"),
+        (True, False, "the result in {out} is an earlier one"),
+        (True, True, "what was computed is in {out}"),
+    ],
+)
 def test_interrupt_ends_a_solve_in_the_midst_of_ipopt(
-    written: bool, words: str, task_file: Path, tmp_path: Path
+    there: bool, writes: bool, words: str, task_file: Path, tmp_path: Path
 ) -> None:
-    if written:
-        example_design().save(tmp_path / "out")
+    out = tmp_path / "out"
+    if there:
+        example_design().save(out)
 
     def heed_interrupts() -> None:
         # What a shell runs in the background ignores them, and hands that down.
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
-    command = [sys.executable, "-c", ENDLESS, str(task_file), "--out", str(tmp_path / "out")]
+    command = [sys.executable, "-c", ENDLESS, str(task_file), "--out", str(out)]
+    surroundings = {**os.environ, **({"EARLIER": str(out)} if writes else {})}
     with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heed_interrupts
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=surroundings,
+        preexec_fn=heed_interrupts,
     ) as process:
         assert process.stdout
         assert process.stdout.readline() == "solving\n"
@@ -378,7 +395,7 @@ def test_interrupt_ends_a_solve_in_the_midst_of_ipopt(
         process.send_signal(signal.SIGINT)
         _, err = process.communicate(timeout=30)
     assert process.returncode == 130
-    assert words in err
+    assert words.format(out=out) in err
     assert "Traceback" not in err
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +12,7 @@ from typer.testing import CliRunner
 
 from casadi_hands.cli import main
 from casadi_hands.cli.app import app
-
-
-@dataclass(frozen=True)
-class News:
-    stage: str
-    text: str
-    elapsed: float
+from casadi_hands.pipeline import Progress
 
 
 def run(*arguments: Any) -> Any:
@@ -43,7 +36,7 @@ def test_options_are_handed_on(ball_file: Path, tmp_path: Path, monkeypatch: pyt
 
     def formulate(task: Any, stage: str, seed: int | None, *, jobs: int | None, progress: Any) -> Saved:
         calls.append((task.fingers.keys(), stage, seed, jobs))
-        progress(News(stage, "thinking", 0.0))
+        progress(Progress(stage, "thinking", 0.0))
         return Saved()
 
     monkeypatch.setattr("casadi_hands.pipeline.formulate.formulate", formulate)

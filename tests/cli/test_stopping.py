@@ -72,7 +72,7 @@ def test_all_its_processes_end_with_it_and_nothing_temporary_stays(
     _, err = process.communicate(timeout=10)
     if sign == signal.SIGTERM:
         assert process.returncode == 143
-        assert f"casadi-hands solve --resume {out}" in err.replace("\n", "")
+        assert f"casadi-hands solve --resume {out}" in err
         assert {each.name for each in beside(out).iterdir()} == {
             "lock",
             "request.json",
