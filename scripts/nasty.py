@@ -11,160 +11,14 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
+from nasty_words import HEADS, SNIPPETS, TAILS, VALUES
+
 from casadi_hands.task import Task
 from casadi_hands.task.structure import walk
 from casadi_hands.task.yamlfile import TaskFile
 
 PROBLEMS = Path(__file__).resolve().parents[1] / "problems"
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.])")
-
-_SNIPPETS = (
-    *(
-        "!!int abc",
-        "!!float x",
-        "!!bool x",
-        "!!int ''",
-        "!foo 3",
-        "!!null 1",
-        "!!str 5",
-        "!!int 5",
-        "!!float .5",
-        "! 5",
-    ),
-    *("!!python/object:os.system x", "!!binary aGk=", "!!set {a, b}", "!!omap [a: 1]", "!!timestamp x", "!!map [1]"),
-    *("!!seq {a: 1}", "!!int [1]", "!!str {}", "!<tag:yaml.org,2002:int> 7", "!e!x 1", "!!merge <<", "&a {<<: *a}"),
-    *("&a [*a]", "*nothing", "&b", "*", "&", "{<<: 3}", "{<<: [1, 2]}", "{<<: {at: 1}}", "{<<: [{at: 1}, {at: 2}]}"),
-    *("? [a, b]\n", "{[1, 2]: 3}", "{{a: 1}: 2}", "{? a : b}", "{null: 1}", "{: 1}", "{1: 2, 1: 3}", "{a, b}", "? x"),
-    *("|\n  text\n", ">\n  text\n", "|9", "|+", "'", '"', "[", "]", "{", "}", "[,]", "{,}", "-", "- 1", "---", "..."),
-    *(
-        '"\\0"',
-        '"\\e[31m"',
-        '"\\x1b"',
-        '"\\ud800"',
-        '"\\U00110000"',
-        '"\\u202e"',
-        '"\\N"',
-        '"\\q"',
-        '"a\\nb"',
-        '"\\u2028"',
-    ),
-    *(
-        "\0",
-        "\x1b[2J",
-        "\x07",
-        "\x85",
-        "\u2028",
-        "\u202e",
-        "\ufeff",
-        "\ufffe",
-        "\U0001f600",
-        "\u00e9",
-        "\t",
-        "%",
-        "@",
-        "`",
-    ),
-    *(".inf", "-.inf", ".nan", "1e400", "-1e400", "1e-400", "1e308", "1e-308", "5e-324", "0x1F", "0o17", "017", "08"),
-    *(
-        "0b11",
-        "1_000",
-        "_",
-        "1:30",
-        "1e",
-        "+",
-        "1.",
-        ".5",
-        "0",
-        "-0.0",
-        "1e5",
-        "1e200",
-        "1e-200",
-        "1e12",
-        "1e13",
-        "9" * 400,
-    ),
-    *(
-        "1" * 4301,
-        "0x" + "f" * 500,
-        "0." + "3" * 3000,
-        "true",
-        "yes",
-        "~",
-        "null",
-        "''",
-        "2020-01-01",
-        "=",
-        "<<",
-        "[]",
-        "{}",
-    ),
-    *(
-        "[" * 30 + "]" * 30,
-        "[" * 3000,
-        "{a: " * 30 + "1" + "}" * 30,
-        "[1, 2, 3]",
-        "[[1, 2], [3]]",
-        "[" + "1, " * 9000 + "1]",
-    ),
-    *(
-        "x" * 5000,
-        "'" + "x" * 300 + "'",
-        "{" + ", ".join(f"k{i}: {i}" for i in range(900)) + "}",
-        "%YAML 1.1",
-        "# comment",
-    ),
-)
-_HEADS = (
-    "%YAML 1.1\n---\n",
-    "%YAML 1.2\n---\n",
-    "%YAML 9.9\n---\n",
-    "%YAML " + "1" * 5000 + ".1\n---\n",
-    "%TAG ! tag:example.org,2000:\n---\n",
-    "%FOO bar\n---\n",
-    "---\n",
-    "--- !foo\n",
-    "--- &a\n",
-    "\ufeff",
-    "\n" * 1000,
-    "# " + "x" * 100_000 + "\n",
-    "# c\n" * 9000,
-    "a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1]\n"
-    + "".join(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]\n" for i in range(1, 9)),
-)
-_TAILS = (
-    "\n---\na: 1\n",
-    "\n...\n",
-    "\n...\nx",
-    "\nname: again\n",
-    "\n" * 500,
-    "\n\tx: 1\n",
-    "\n? ",
-    "\n- 1\n",
-    " #",
-    "\nx: &x\n<<: *x\n",
-)
-_VALUES: tuple[Any, ...] = (
-    *(None, True, False, 0, -1, 1, 2, 10**6, 10**30, -(10**30), 0.0, -0.0, 1e-300, 1e300, 1e-30, 1e-9, 1e9, 1e11, 1e12),
-    *(
-        math.inf,
-        -math.inf,
-        math.nan,
-        "",
-        "x",
-        "none",
-        "remote",
-        "fewest",
-        "PLA",
-        "1",
-        "\0",
-        "\x1b[31m",
-        "\ud800",
-        "a\nb",
-    ),
-    *("x" * 5000, [], {}, [0, 0, 0], [0.0, 0.0, 1e-300], [1e-160, 0, 0], [1e12] * 3, [1, 2, 3], [1, 2], [2, 1], [0, 0]),
-    *([1, 0, 0, 0], [[1, 0, 0], [0, 1, 0], [0, 0, 1]], [[1e-9, 0, 0]] * 3, [math.nan] * 3, [None] * 3, ["a"] * 3),
-    *({"servo": "STS3215"}, {"axis": [1, 1, 1], "degrees": 299}, {"quaternion": [0, 0, 0.7, 0.7]}, {"at": 1}),
-)
 
 
 def mutant(number: int) -> bytes:
@@ -248,7 +102,7 @@ def _as_numbers(text: str, random: Random) -> str:
 def _as_snippets(text: str, random: Random) -> str:
     """What YAML allows and nobody expects, in place of a value, a name or a line, or before or after it all."""
     for _ in range(random.randint(1, 2)):
-        snippet, how = random.choice(_SNIPPETS), random.randrange(6)
+        snippet, how = random.choice(SNIPPETS), random.randrange(6)
         places = list((_NUMBER if how < 3 else re.compile(r"\w+|\[.*?\]|\{.*?\}")).finditer(text))
         if how < 5 and places:
             place = random.choice(places)
@@ -256,24 +110,15 @@ def _as_snippets(text: str, random: Random) -> str:
         else:
             name = random.choice(_fields())
             text = random.choice(
-                (random.choice(_HEADS) + text, text + random.choice(_TAILS), f"{text}\n{name}: {snippet}\n")
+                (random.choice(HEADS) + text, text + random.choice(TAILS), f"{text}\n{name}: {snippet}\n")
             )
     return text
 
 
 def _as_noise(text: str, random: Random) -> str:
     """Tokens of YAML and of tasks in any order."""
-    tokens = (
-        *_SNIPPETS,
-        *"[]{}:,-?&*!|>'\"#%",
-        ": ",
-        "- ",
-        "\n",
-        "\n  ",
-        "\n    ",
-        *_fields(),
-        *re.findall(r"\S+", text),
-    )
+    structure = (*"[]{}:,-?&*!|>'\"#%", ": ", "- ", "\n", "\n  ", "\n    ")
+    tokens = (*SNIPPETS, *structure, *_fields(), *re.findall(r"\S+", text))
     return "".join(random.choice(tokens) for _ in range(random.choice((3, 10, 40))))
 
 
@@ -288,7 +133,7 @@ def _as_structure(text: str, random: Random) -> str:
         other, name = random.choice(places)
         how = random.randrange(10)
         if how < 3:
-            holder[key] = deepcopy(random.choice(_VALUES))
+            holder[key] = deepcopy(random.choice(VALUES))
         elif how == 3:
             holder[key] = deepcopy(other[name])
         elif how == 4:
@@ -317,7 +162,7 @@ def _add(data: dict[str, Any], random: Random) -> None:
             here = random.choice(here)
     if isinstance(here, dict):
         value = random.choice(
-            (random.choice(_VALUES), 10 ** random.uniform(-4, 3), [random.uniform(-1, 1) for _ in range(3)])
+            (random.choice(VALUES), 10 ** random.uniform(-4, 3), [random.uniform(-1, 1) for _ in range(3)])
         )
         here[last] = deepcopy(value)
 
