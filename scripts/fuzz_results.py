@@ -23,7 +23,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from mutants import FILES, mutate
+from mutant_files import FILES
+from mutants import mutate
 
 from casadi_hands.errors import HandsError
 from casadi_hands.export.design import Design
