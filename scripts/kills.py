@@ -212,8 +212,8 @@ def complete(folder: Path) -> str:
 
 
 def content(file: Path) -> Any:
-    """What two files of one design have in common: all but times, of `result.json`, and the page that shows them."""
-    if not file.exists() or file.name == "viewer.html":
+    """What two files of one design have in common: all but times, of `result.json`, and the pages that show them."""
+    if not file.exists() or file.suffix == ".html":
         return file.exists()
     if file.name != "result.json":
         return file.read_bytes()
