@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from apart import ENDED
-from browser import browser
+from browser import MISSING, browser
 from entries import Entry, entry_of, figures_of
 from gallery import HEAD, main, row, write_all
 from PIL import Image
@@ -55,7 +55,7 @@ def result(file: Path, out: Path, seed: int, status: str, **changes: object) -> 
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder ``out`` with the page and the table of tasks that ended in every way."""
     if browser() is None:
-        pytest.skip("no browser that runs without a screen")
+        pytest.skip(MISSING)
     root = tmp_path_factory.mktemp("gallery")
     problems, out = root / "problems", root / "out"
     good = problem(problems, "good", "# Figures 3.2c and 3.7a of CMU-RI-TR-18-36: a task.\n")

@@ -3,7 +3,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from browser import browser
+from browser import MISSING, browser
 from pictures import main, tiled
 from PIL import Image
 
@@ -20,7 +20,7 @@ def test_tiles_stand_row_by_row() -> None:
 
 def test_a_page_is_drawn_at_its_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if browser() is None:
-        pytest.skip("no browser that runs without a screen")
+        pytest.skip(MISSING)
     example_design().save(tmp_path / "design")
     file, folder = str(tmp_path / "both.png"), str(tmp_path / "design")
     monkeypatch.setattr("sys.argv", ["pictures.py", file, folder, folder, "--at", "0", "1", "--size", "500", "400"])

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from browser import browser
+from browser import MISSING, browser
 from PIL import Image
 from stills import SIZE, stills
 
@@ -16,7 +16,7 @@ from casadi_hands.export.design import Design
 from casadi_hands.export.page.scene import eye_towards
 from tests.export.example import example_hand, example_motion, example_task
 
-pytestmark = pytest.mark.skipif(browser() is None, reason="no browser that runs without a screen")
+pytestmark = pytest.mark.skipif(browser() is None, reason=MISSING)
 
 
 def yellow_middle(picture: bytes) -> np.ndarray:
