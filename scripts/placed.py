@@ -105,13 +105,8 @@ def in_all(records: list[tuple[dict[str, Any], dict[str, Any] | None]]) -> str:
     """How many are certified, and the joints of those that are with both kinds of contacts."""
     certified = [record["status"] == "certified" for record, _ in records]
     both = [(r, o) for r, o in records if o is not None and r["status"] == o["status"] == "certified"]
-    placed, given = (sum(count(pair[k]) for pair in both) for k in (0, 1))
+    placed, given = (sum(pair[k]["degrees_of_freedom"] for pair in both) for k in (0, 1))
     return f"{sum(certified)} of {len(certified)} certified; {placed} joints where given contacts take {given}"
-
-
-def count(record: dict[str, Any]) -> int:
-    """Joints of a hand."""
-    return sum(len(finger["links"]) for finger in record["hand"]["fingers"])
 
 
 if __name__ == "__main__":

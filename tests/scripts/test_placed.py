@@ -22,6 +22,7 @@ def record(status: str, joints: list[int], **more: Any) -> dict[str, Any]:
         "status": status,
         "reason": "",
         "hand": hand,
+        "degrees_of_freedom": sum(joints),
         "seconds": {"total": 9.6},
         "placement": {},
         **more,
