@@ -6,12 +6,12 @@ from dataclasses import replace
 
 from casadi_hands.export.design import Design
 
-OF = 12
+OF = 20
 
 
 def replayed(design: Design, drops: int) -> Design:
     """A design whose files hold or not, and whose perturbed replays drop the object so often."""
-    few = drops <= OF / 10
+    few = drops <= OF / 20
     status = "feasible" if design.status == "certified" and not few else design.status
     entry = {
         "engine": "mujoco",
@@ -21,5 +21,5 @@ def replayed(design: Design, drops: int) -> Design:
         "of": OF,
         "perturbed": {f"number {k}": {"dropped": k < drops} for k in range(OF)},
     }
-    certificate = {**design.certificate, "replay_dropped": {"value": drops / OF, "limit": 0.1, "holds": few}}
+    certificate = {**design.certificate, "replay_dropped": {"value": drops / OF, "limit": 0.05, "holds": few}}
     return replace(design, status=status, replays=[entry], certificate=certificate)

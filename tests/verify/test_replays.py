@@ -32,16 +32,16 @@ def test_the_worst_goal_is_named_with_its_time() -> None:
 
 
 @pytest.mark.parametrize(("drops", "holds"), [(0, True), (1, True), (2, False)])
-def test_a_tenth_of_the_perturbed_replays_may_drop_the_object(drops: int, holds: bool) -> None:
-    perturbed = {f"number {k}": played(dropped=k < drops) for k in range(12)}
+def test_one_in_twenty_perturbed_replays_may_drop_the_object(drops: int, holds: bool) -> None:
+    perturbed = {f"number {k}": played(dropped=k < drops) for k in range(20)}
     seen = Replays("mujoco", TASK, 1e-3, 0, NEAR, perturbed)
     *_, dropped = seen.figures()
-    assert (dropped.name, dropped.value, dropped.holds) == ("replay_dropped", drops / 12, holds)
+    assert (dropped.name, dropped.value, dropped.holds) == ("replay_dropped", drops / 20, holds)
     assert seen.drops == drops
     assert seen.dropping == ("number 0", "number 1")[:drops]
     assert seen.dropped_before() is None
     record = json.loads(json.dumps(seen.record(), allow_nan=False))
-    assert (record["dropped"], record["of"], record["dropped_as_planned"]) == (drops, 12, False)
+    assert (record["dropped"], record["of"], record["dropped_as_planned"]) == (drops, 20, False)
     assert record["goals"][1] == {"mm": 2.0, "degrees": 4.0}
     assert (record["mean"], record["largest"]) == ({"mm": 1.0, "degrees": 0.1}, {"mm": 2.0, "degrees": 0.2})
 
