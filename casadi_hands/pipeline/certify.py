@@ -68,7 +68,7 @@ class Certifier:
                 may_grow = self._more_joints(found, failing) is not None
                 if rolling >= HANDS_REFINED and may_grow:
                     break
-                judged, refined = self._certify(candidate, short)
+                judged, refined = self.certify(candidate, short)
                 best = self.record.update_best(judged)
                 if judged.status == "certified":
                     return best
@@ -84,8 +84,16 @@ class Certifier:
             self.record.log("synthesis", f"another joint for {', '.join(sorted(failing)) or 'the fingers with fewest'}")
             found = run_search(self.record, self.model, self.search, least)
 
-    def _certify(self, candidate: Candidate, short: tuple[Reason, ...]) -> tuple[Design, Refined]:
-        """Find a hand's motion and refine it; where contacts cannot go with the object, from a shorter one on."""
+    def certify(self, candidate: Candidate, short: tuple[Reason, ...] = ()) -> tuple[Design, Refined]:
+        """Find a hand's motion and refine it; where contacts cannot go with the object, from a shorter one on.
+
+        Args:
+            candidate: the hand.
+            short: what its fingers could not do before.
+
+        Returns:
+            the design, replayed where its files hold, and its refinement.
+        """
         model, floating, homotopy = self._begun
         whole = run_whole_hand(self.record, model, floating, candidate)
         return self.refiner.certify(whole, short, homotopy=homotopy)

@@ -23,6 +23,7 @@ from casadi_hands.pipeline.certify import Certifier
 from casadi_hands.pipeline.couplings import Coupler
 from casadi_hands.pipeline.judge import Judge, counted
 from casadi_hands.pipeline.placing import ATTEMPTS, place, placed_like, unplaceable
+from casadi_hands.pipeline.pruning import Pruner
 from casadi_hands.pipeline.rank import rank_of
 from casadi_hands.pipeline.record import STAGES, Progress, Record, Stage
 from casadi_hands.pipeline.refiner import Refiner
@@ -239,7 +240,9 @@ def _run(record: Record, until: str, executor: Executor | None, jobs: int) -> De
         design = judge.judge(record.design, [shortcoming_reason(model, short) for short in found.short])
         judged = record.held_to_bounds(design)
         return judge.replayed(judged, jobs) if judged.status == "certified" else judged
-    design = judge.concluded(Certifier(record, model, floating, search, judge, jobs).run(found), jobs)
+    certifier = Certifier(record, model, floating, search, judge, jobs)
+    design = Pruner(record, search, lambda candidate: certifier.certify(candidate)[0]).run(certifier.run(found))
+    design = judge.concluded(design, jobs)
     return Coupler(record, model, judge, jobs).run(design)
 
 

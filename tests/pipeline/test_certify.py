@@ -62,7 +62,7 @@ class Loop(Certifier):
         self.least.append(arguments[-1])
         return found((arguments[-1][0], arguments[-1][1]))
 
-    def _certify(self, candidate: Candidate, short: Any) -> tuple[Design, Any, int]:
+    def certify(self, candidate: Candidate, short: Any) -> tuple[Design, Any, int]:
         missed, contacts, slips = self.verdicts[len(self.tried)]
         self.tried.append(candidate.joints)
         refined = SimpleNamespace(

@@ -121,6 +121,11 @@ class Search:
             for c in growing:
                 joints[c] += 1
 
+    def with_joints(self, joints: Mapping[int, int]) -> list[Candidate]:
+        """Hands of fingers with ``joints[contact]`` joints, whether these are enough or not, best first."""
+        self._grow(joints, [c for c in self.contacts if self.grown.get(c) != joints[c]])
+        return self._recombine(sum(joints.values()))
+
     def _grow(self, joints: Mapping[int, int], growing: list[int]) -> None:
         """Fresh trials of the fingers that got a joint."""
         work = [
