@@ -126,7 +126,11 @@ class HandSpec(Section):
     """What fingers can be built."""
 
     link_radius: Positive = Field(
-        description="Radius of every link, m.", json_schema_extra={"default": "0.13 × palm.radius"}
+        description="Radius of every link, m.",
+        json_schema_extra={
+            "default": "0.13 × palm.radius; more where a straight finger would bend by over 2 % of the object's "
+            "characteristic length under its weight over the friction, as far as contacts leave room"
+        },
     )
     link_length: Pair = Field(
         description="Shortest and longest link, m.",

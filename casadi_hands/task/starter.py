@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from casadi_hands.errors import TaskError
 from casadi_hands.task.schema import schema_line
 from casadi_hands.task.shown import escaped
+from casadi_hands.task.thickness import OF_PALM
 
 SIZES = {
     "sphere": ("diameter",),
@@ -144,7 +145,7 @@ def starter(idea: Idea) -> str:
         "# Where each fingertip touches the object at first, in the object's frame. The program may shift it a little.",
         "# Fingers can only push, so they stand opposite each other.",
         "fingers:",
-        *(f"  {name}: {{touches: {_list(point)}}}" for name, point in _contacts(idea, 0.13 * palm)),
+        *(f"  {name}: {{touches: {_list(point)}}}" for name, point in _contacts(idea, OF_PALM * palm)),
         "",
         "friction: 0.7  # of fingertips and object: rubber on most things has 0.5 to 1",
         "",

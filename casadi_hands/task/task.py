@@ -32,6 +32,7 @@ from casadi_hands.task.palm import Palm
 from casadi_hands.task.region import counted_fingers
 from casadi_hands.task.search import Search
 from casadi_hands.task.servos import servo_reach
+from casadi_hands.task.thickness import usual_link_radius
 from casadi_hands.task.weights import Weights
 
 STANDARD_GRAVITY = 9.81  # m/s²
@@ -125,19 +126,25 @@ class Task(Section):
     def _hand_defaults(cls, value: Any, info: ValidationInfo) -> Any:
         body, palm, fingers, goals = (info.data.get(name) for name in ("object", "palm", "fingers", "motion"))
         clearance = USUAL_CLEARANCE * body.characteristic_length if body else 1.0
-        value = fill(value, link_radius=0.13 * palm.radius if palm else 1.0, clearance=clearance)
+        value = fill(value, clearance=clearance)
         if not isinstance(value, dict):
             return value
+        usual, reach = 1.0, None
+        if palm and body and fingers and goals:
+            touched = [finger.point for finger in fingers.values() if finger.is_placed]
+            points = touched if len(touched) == len(fingers) else [*touched, *body.extremes]
+            reach = palm.radius + _farthest_contact(palm, points, goals, info.data.get("tool"))
+            gravity = float(np.linalg.norm(info.data.get("gravity", 0.0))) or STANDARD_GRAVITY
+            force = body.mass * gravity / info.data.get("friction", 1.0)
+            length, material = body.characteristic_length, value.get("material")
+            usual = usual_link_radius(palm.radius, length, force, reach, material, touched)
+        value = fill(value, link_radius=usual)
         radius = value["link_radius"]
         plain = isinstance(radius, float | int)
         if "link_length" in value:
             return fill(value, hinge_length=usual_hinge(radius, value["link_length"]) if plain else 0.0)
         length = (1.0, 1.0)
-        if palm and fingers and goals and plain:
-            touched = [finger.point for finger in fingers.values() if finger.is_placed]
-            if len(touched) < len(fingers) and body:
-                touched = [*touched, *body.extremes]
-            reach = palm.radius + _farthest_contact(palm, touched, goals, info.data.get("tool"))
+        if reach is not None and plain:
             shortest = max(SHORTEST_LINK * radius, 2.0 * servo_reach(value.get("drive")))
             length = (shortest, max(shortest, reach))
         return fill({**value, "link_length": length}, hinge_length=usual_hinge(radius, length) if plain else 0.0)

@@ -16,5 +16,5 @@ def test_defaults_and_places() -> None:
     assert "### `palm.motion[]`" in text
     assert "| `slip` | 0.0002 |" in text
     assert "| `mass` | required | Mass, kg. |" in text
-    assert "| `link_radius` | 0.13 × palm.radius |" in text
+    assert "| `link_radius` | 0.13 × palm.radius; more where a straight finger would bend" in text
     assert "| `tip_target` | [50, 10, 50] |" in text
