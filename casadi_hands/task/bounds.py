@@ -38,6 +38,7 @@ COUNTS = {
     "motion": 200,
     "palm.motion": 200,
     "perturbations": 100,
+    "keep_out": 100,
     "fingers": 20,
 }
 """Most elements of lists and mappings, by the path of their field."""

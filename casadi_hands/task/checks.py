@@ -30,6 +30,7 @@ def check(task: Task) -> list[Problem]:
     timing = list(_goal_times(task)) + list(_goal_kinds(task)) + list(_other_times(task)) + list(_attached(task))
     # Where things stand at the goals says nothing while the goals themselves are in doubt.
     places = [] if timing else list(_turns(task)) + list(_object_places(task)) + list(_palm_places(task))
+    places += list(_keep_out(task))
     return timing + places + list(_contacts(task)) + list(_object_points(task))
 
 
@@ -121,7 +122,7 @@ def _object_places(task: Task) -> Iterator[Problem]:
         goal = task.motion[number]
         path = ("motion", number, "position" if goal.position is not None else "tool_at")
         given = str(list(goal.position or goal.tool_at or ()))
-        depth = depth_in_palm(body, position, vector, palm)
+        depth = -np.inf if palm.auto else depth_in_palm(body, position, vector, palm)
         if depth > _TYPED * body.characteristic_length and (number == 0 or fixed):
             allowed = f"a place where the object is clear of the palm; here it is {depth:.3g} m inside"
             yield Problem(path, given, allowed)
@@ -132,7 +133,7 @@ def _object_places(task: Task) -> Iterator[Problem]:
 
 
 def _palm_places(task: Task) -> Iterator[Problem]:
-    if not task.ground:
+    if not task.ground or task.palm.auto:
         return
     for number, (_, position, rotation) in enumerate(task.palm.waypoints):
         depth = palm_depth_below(task.palm, position, rotation, task.ground.height)
@@ -140,6 +141,21 @@ def _palm_places(task: Task) -> Iterator[Problem]:
             path = ("palm", "position") if number == 0 else ("palm", "motion", number - 1, "position")
             allowed = f"a place where the whole palm is above the ground; here it is {depth:.3g} m below"
             yield Problem(path, str([float(x) for x in position]), allowed)
+
+
+def _keep_out(task: Task) -> Iterator[Problem]:
+    """Boxes that the palm may not be in."""
+    palm = task.palm
+    if task.keep_out and (palm.motion or palm.may_move):
+        name = "motion" if palm.motion else "moves"
+        allowed = "a palm that stands still, where there are boxes that it keeps off (keep_out)"
+        yield Problem(("palm", name), "a palm that moves", allowed)
+    elif not palm.auto:
+        for box in task.keep_out:
+            distance = box.distance_from_palm(np.array(palm.position), palm.rotation, palm.radius, palm.thickness)
+            if distance <= 0:
+                allowed = f"a place where the whole palm is out of {box} (keep_out); or `palm: auto`"
+                yield Problem(("palm", "position"), str([float(x) for x in palm.position]), allowed)
 
 
 def _contacts(task: Task) -> Iterator[Problem]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path as FilePath
@@ -16,6 +17,7 @@ from casadi_hands.task.given import Given, TaskData, plain
 from casadi_hands.task.mesh import FOLDER, WITHIN
 from casadi_hands.task.messages import explain
 from casadi_hands.task.normalise import normalise
+from casadi_hands.task.palm_place import stand
 from casadi_hands.task.problem import Problem, Question
 from casadi_hands.task.quaternion_order import wrong_order
 from casadi_hands.task.shown import joined, printable
@@ -86,11 +88,10 @@ def _build(file: TaskFile | TaskData, name: str, folder: FilePath | None, within
     problems = bound(file.data)
     if problems:
         raise _refusal(problems, file)
-    try:
-        task = Task.model_validate({"name": name, **file.data}, context={FOLDER: folder, WITHIN: within})
-    except ValidationError as error:
-        errors = sorted(error.errors(include_url=False), key=lambda each: file.line(each["loc"]))
-        raise _refusal(explain(errors[:_MOST]), file, len(errors[_MOST:])) from None
+    context = {FOLDER: folder, WITHIN: within}
+    task = _validated({"name": name, **file.data}, file, context)
+    if task.palm.auto:
+        task = _validated({"name": name, **file.data, "palm": _stood(task, file)}, file, context)
     order = list(wrong_order(file.data))
     problems = bound_together(task) or check(task) + [each for each in order if isinstance(each, Problem)]
     questions = [*doubtful_units(task), *(each for each in order if isinstance(each, Question))]
@@ -102,6 +103,34 @@ def _build(file: TaskFile | TaskData, name: str, folder: FilePath | None, within
         raise _refusal(problems, file)
     task.was_given(Given(file.data, partial(_taken, name=name, folder=folder, within=within)))
     return task, _lines(questions, file)
+
+
+def _validated(data: dict[str, Any], file: TaskFile | TaskData, context: dict[str, Any]) -> Task:
+    """The task of some fields, each valid."""
+    try:
+        return Task.model_validate(data, context=context)
+    except ValidationError as error:
+        errors = sorted(error.errors(include_url=False), key=lambda each: file.line(each["loc"]))
+        raise _refusal(explain(errors[:_MOST]), file, len(errors[_MOST:])) from None
+
+
+def _stood(task: Task, file: TaskFile | TaskData) -> dict[str, Any]:
+    """The palm's fields, with a place that the program finds; ``task`` is all else."""
+    problems = bound_together(task) or check(task)
+    if not problems:
+        task, problems = normalise(task)
+    if problems:
+        raise _refusal(problems, file)
+    given = file.data["palm"] if isinstance(file.data["palm"], dict) else {}
+    hand = file.data.get("hand")
+    # The usual length of links follows from the palm's place.
+    fixed = isinstance(hand, dict) and "link_length" in hand
+    reach = task.search.max_joints * task.hand.link_length[1] + task.hand.link_radius
+    palm = stand(task, given.get("facing") is not None, reach if fixed else math.inf)
+    if isinstance(palm, Problem):
+        raise _refusal([palm], file)
+    placed = {"position": list(palm.position), "facing": list(palm.facing), "placed": True}
+    return {name: value for name, value in given.items() if name != "auto"} | placed
 
 
 def _refusal(problems: list[Problem], file: TaskFile | TaskData, more: int = 0) -> TaskError:

@@ -53,8 +53,20 @@ class Palm(Section):
         description="Thickness of the disc, m; it lies behind the face with the fingers.",
         json_schema_extra={"default": "0.2 × palm.radius"},
     )
-    position: Vector = Field(description="Centre of the face with the fingers at the start, m, world.")
-    facing: Vector = Field(description="Where the fingers point at the start, world; any length.")
+    auto: Flag = Field(
+        default=False,
+        exclude=True,
+        description="Whether the program is to stand the palm where fingers reach best; `palm: auto` is short for "
+        "`palm: {auto: true}`. What else is given of the palm, it keeps to.",
+    )
+    position: Vector = Field(
+        description="Centre of the face with the fingers at the start, m, world.",
+        json_schema_extra={"default": "required, but for `auto`"},
+    )
+    facing: Vector = Field(
+        description="Where the fingers point at the start, world; any length.",
+        json_schema_extra={"default": "required, but for `auto`"},
+    )
     up: Vector | None = Field(
         default=None,
         description="Direction towards which the palm's x axis leans, world; it says how the palm is rolled.",
@@ -67,8 +79,23 @@ class Palm(Section):
         default=None,
         description="Poses at which the palm rests after the start: its motion, or, if it `moves`, a first guess.",
     )
+    placed: Flag | None = Field(
+        default=None, description="Whether the program stood the palm where it is; the program writes it."
+    )
 
     _direction = field_validator("facing", "up")(_check_direction)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _anywhere(cls, value: Any) -> Any:
+        if not isinstance(value, dict) or value.get("auto") is not True:
+            return value
+        for name in ("position", "motion"):
+            if value.get(name) is not None:
+                raise refuse(f"a palm without `{name}` where `auto: true` lets the program choose; or without `auto`")
+        # Until it stands somewhere.
+        given = {name: each for name, each in value.items() if each is not None}
+        return {"position": (0.0, 0.0, 0.0), "facing": (0.0, 0.0, -1.0), **given}
 
     @model_validator(mode="after")
     def _roll_is_defined(self) -> Palm:

@@ -15,6 +15,7 @@ from casadi_hands.task.fields import Section
 from casadi_hands.task.hand import Ground
 from casadi_hands.task.material import MATERIALS, Material
 from casadi_hands.task.motion import Exert, Goal, Perturbation
+from casadi_hands.task.palm import Palm
 from casadi_hands.task.region import MOST_COUNTED, Region
 from casadi_hands.task.rotation import Rotation
 from casadi_hands.task.servos import SERVOS, Drive
@@ -40,6 +41,7 @@ _WORDS: dict[type[Section], list[str]] = {
     Drive: ["remote"],
     Ground: ["none"],
     Region: ["anywhere"],
+    Palm: ["auto"],
 }
 """What may stand in a section's place."""
 _FORCE_OR_TORQUE = _some_of("force", "torque")
@@ -50,6 +52,16 @@ _RULES: dict[type[Section], dict[str, Any]] = {
     },
     Exert: _FORCE_OR_TORQUE,
     Perturbation: _FORCE_OR_TORQUE,
+    Palm: {
+        "anyOf": [
+            {"required": ["position", "facing"]},
+            {
+                "required": ["auto"],
+                "properties": {"auto": {"const": True}, "motion": {"type": "null"}},
+                "not": {"required": ["position"]},
+            },
+        ]
+    },
     Attached: _some_of(*Attached.model_fields),
     Rotation: {"anyOf": [{"required": ["axis", "degrees"]}, {"required": ["quaternion"], "maxProperties": 1}]},
 }

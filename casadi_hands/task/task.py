@@ -23,6 +23,7 @@ from casadi_hands.task.hand import (
     rubber_torsion,
     usual_hinge,
 )
+from casadi_hands.task.keep_out import KeepOut
 from casadi_hands.task.limits import USUAL_DEFLECTION, Limits, usual_replay_position
 from casadi_hands.task.material import hinge_loads
 from casadi_hands.task.motion import Goal, Perturbation
@@ -47,7 +48,7 @@ class Task(Section):
     )
     about: str = Field(default="", description="What it is about, in a sentence.")
     object: ManipulatedObject = Field(description="The object to move.")
-    palm: Palm = Field(description="The palm and where it stands.")
+    palm: Palm = Field(description="The palm and where it stands; `auto` lets the program choose that.")
     motion: tuple[Goal, ...] = Field(
         min_length=2, description="Goals that the object passes through, in order of time."
     )
@@ -74,6 +75,9 @@ class Task(Section):
     gravity: Vector = Field(default=(0.0, 0.0, -STANDARD_GRAVITY), description="Gravity, m/s², world.")
     ground: Ground | None = Field(
         default=None, description="The floor the object may rest on; `none` if there is none."
+    )
+    keep_out: tuple[KeepOut, ...] = Field(
+        default=(), description="Boxes of the world that the palm, which then stands still, keeps off."
     )
     perturbations: tuple[Perturbation, ...] = Field(default=(), description="Disturbances that the grasp must stand.")
     hand: HandSpec = Field(default={}, validate_default=True, description="What fingers can be built.")
@@ -102,6 +106,7 @@ class Task(Section):
     @classmethod
     def _palm_defaults(cls, value: Any, info: ValidationInfo) -> Any:
         body = info.data.get("object")
+        value = {"auto": True} if value == "auto" else value
         return fill(value, radius=1.2 * body.characteristic_length if body else 1.0)
 
     @field_validator("fingers")

@@ -96,6 +96,8 @@ def _size(task: Task) -> float:
 
 def _distance(task: Task) -> float:
     """Of the object's centre, at the goal where it is most, from the nearest place the palm passes, m."""
+    if task.palm.auto:  # which stands nowhere yet
+        return 0.0
     places = np.array([position for _, position, _ in task.palm.waypoints])
     return max(float(np.linalg.norm(places - goal, axis=1).min()) for _, goal, _ in task.goal_poses())
 
