@@ -32,7 +32,9 @@ def design_summary(design: Design, folder: Path) -> RenderableType:
         parts.append(Text(f"replays: {design.replay_words}"))
     if design.reason:
         parts.append(Text(f"{'why' if design.status == 'failed' else 'note'}: {design.reason}"))
-    if design.placement and design.status != "failed":
+    if "palm" in design.placement:
+        parts.append(Text(f"palm placed: {design.placement['palm']['why']}"))
+    if "why" in design.placement and design.status != "failed":
         parts.append(Text(f"contacts placed: {design.placement['why']}"))
     if design.hand is not None:
         fingers = ", ".join(f"{finger.name} {len(finger.links)}" for finger in design.hand.fingers)

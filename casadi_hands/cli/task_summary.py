@@ -15,6 +15,7 @@ from casadi_hands.placement.place import Proposal, propose
 from casadi_hands.problem.si import build_model
 from casadi_hands.task import FingerSpec, Goal, Task
 from casadi_hands.task.attached import Attached
+from casadi_hands.task.palm_place import standing
 
 
 def check_summary(task: Task, questions: Sequence[str] = ()) -> tuple[RenderableType, bool]:
@@ -76,6 +77,7 @@ def _lines(task: Task, force_limit: float) -> Iterator[tuple[str, str]]:
     if task.object.attached is not None:
         yield "", _joint(task.object.attached)
     yield "palm", _palm(task)
+    yield from _standing(task)
     for i, (name, finger) in enumerate(task.fingers.items()):
         yield "" if i else "fingers", f"{name} {_touches(finger)}"
     most = f"{force_limit:g} weights ({force_limit * task.force_unit:.3g} N)"
@@ -138,6 +140,15 @@ def _palm(task: Task) -> str:
     moves = "the program may move it" if palm.may_move else "moves as the task says" if palm.motion else "stands still"
     disc = f"disc of {1e3 * palm.radius:.4g} mm radius, {1e3 * palm.thickness:.4g} mm thick"
     return f"{disc}, at {_mm(palm.position)}, fingers point to {_numbers(palm.facing)}; {moves}"
+
+
+def _standing(task: Task) -> Iterator[tuple[str, str]]:
+    """Where a palm stands that the program placed, and what it keeps off."""
+    if task.palm.placed:
+        yield "", f"placed by the program: {standing(task)}"
+    elif task.keep_out:
+        gaps = standing(task).keep_out_gaps
+        yield "", f"keeps off {', '.join(f'{name}, {1e3 * gap:.3g} mm away' for name, gap in gaps.items())}"
 
 
 def _links(task: Task) -> str:

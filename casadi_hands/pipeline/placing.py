@@ -17,6 +17,8 @@ from casadi_hands.stages.synthesis.algorithm import Search
 from casadi_hands.stages.synthesis.score import singular_fingers
 from casadi_hands.stages.synthesis.target import target_of
 from casadi_hands.task import Task
+from casadi_hands.task.checks import check
+from casadi_hands.task.palm_place import standing
 
 TRIALS, RECOMBINATIONS = 3, 2  # of the search, where the task's are more
 ATTEMPTS = 2  # sets that are solved in full, the second where the first gives no certified hand
@@ -117,9 +119,28 @@ def placed_like(task: Task, earlier: Task) -> Task:
     return task.model_copy(update={"fingers": kept}) if all(f.is_placed for f in kept.values()) else task
 
 
+def stood_like(task: Task, earlier: Task) -> Task:
+    """The task with the palm of an earlier one, where the program placed both and it may stand there still."""
+    palm, was = task.palm, earlier.palm
+    if not (palm.placed and was.placed and (palm.radius, palm.thickness) == (was.radius, was.thickness)):
+        return task
+    kept = task.model_copy(update={"palm": palm.model_copy(update={"position": was.position, "facing": was.facing})})
+    return task if check(kept) else kept
+
+
+def tell_palm(record: Record) -> None:
+    """Tell, and write into ``placement.json``, where the palm stands, if the program placed it."""
+    palm = record.task.palm
+    if palm.placed:
+        found = standing(record.task)
+        record.log("placement", f"the palm stands at {list(palm.position)} m, facing {list(palm.facing)}: {found}")
+        told = {"position": list(palm.position), "facing": list(palm.facing), **asdict(found), "why": str(found)}
+        record.update(placement={"palm": told})
+
+
 def unplaceable(record: Record, told: dict[str, Any]) -> Design:
     """The failed design of a task whose contacts cannot be placed."""
-    return replace(record.design, status="failed", reason=told["why"], placement=told)
+    return replace(record.design, status="failed", reason=told["why"], placement={**record.design.placement, **told})
 
 
 def _told(task: Task, proposal: Proposal, tried: list[Tried], order: list[int]) -> dict[str, Any]:

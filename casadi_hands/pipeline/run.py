@@ -22,7 +22,7 @@ from casadi_hands.nlp import SolverError
 from casadi_hands.pipeline.certify import Certifier
 from casadi_hands.pipeline.couplings import Coupler
 from casadi_hands.pipeline.judge import Judge, counted
-from casadi_hands.pipeline.placing import ATTEMPTS, place, placed_like, unplaceable
+from casadi_hands.pipeline.placing import ATTEMPTS, place, placed_like, stood_like, tell_palm, unplaceable
 from casadi_hands.pipeline.pruning import Pruner
 from casadi_hands.pipeline.rank import rank_of
 from casadi_hands.pipeline.record import STAGES, Progress, Record, Stage
@@ -102,6 +102,8 @@ def solve(
     if seed is not None:
         task = task.model_copy(update={"search": task.search.model_copy(update={"seed": seed})})
     own_terms = checked(terms)
+    if start is not None and task.palm.placed:
+        task = stood_like(task, Design.load(start).task)
     if start is not None and not task.is_placed:
         task = placed_like(task, Design.load(start).task)
         if not task.is_placed:
@@ -124,6 +126,7 @@ def _solve(record: Record, until: str, start: Path | None, executor: Executor | 
     if until in STAGES[2:]:
         load_mujoco()  # before hours of work, not after them
     with processes(jobs) if executor is None else nullcontext(executor) as workers:
+        tell_palm(record)
         if not record.task.is_placed:
             return _design_placed(record, until, workers, jobs)
         return record.keep(_design(record, until, workers, jobs, start), last=True)
@@ -171,7 +174,7 @@ def _design_placed(record: Record, until: str, workers: Executor | None, jobs: i
     own, best = record, None
     for number, task in enumerate(tasks[: ATTEMPTS if until == STAGES[-1] else 1]):
         # The first is written as it grows; what a second leaves half done shall not replace it.
-        own = own.placed(task, {**told, "chosen": number}, written=number == 0)
+        own = own.placed(task, {**record.design.placement, **told, "chosen": number}, written=number == 0)
         design = _design(own, until, workers, jobs)
         best = design if best is None else min(best, design, key=_rank)
         if best.status == "certified":

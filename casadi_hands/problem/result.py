@@ -28,7 +28,8 @@ class Result:
         replays: one entry for each physics engine that played the design; see ``docs/result-folder.md``.
         stages: one entry for each solver run.
         seconds: wall time by stage, and ``total``.
-        placement: where the program placed contacts, the sets it chose from and why; empty where all were given.
+        placement: where the program placed contacts, the sets it chose from and why, and where it placed the palm, how
+            that stands; empty where all was given.
     """
 
     task: Task

@@ -14,7 +14,7 @@ from casadi_hands.execution.processes import processes
 from casadi_hands.export.design import Design
 from casadi_hands.pipeline import placing, run, solve
 from casadi_hands.pipeline.formulate import formulate
-from casadi_hands.pipeline.placing import Tried, place, placed_like
+from casadi_hands.pipeline.placing import Tried, place, placed_like, stood_like
 from casadi_hands.pipeline.record import Record
 from casadi_hands.pipeline.unfinished import stopped_solve
 from casadi_hands.placement.place import propose
@@ -207,3 +207,43 @@ def test_an_earlier_result_of_other_contacts_is_no_start(tmp_path: Path) -> None
     Design(task=ball("{a: {touches: [0, 0.03, 0]}, b: {touches: [0, -0.03, 0]}}"), status="failed").save(tmp_path)
     with pytest.raises(SolveError, match="has no contacts that were placed for what this task asks"):
         solve(ball(), jobs=1, start=tmp_path)
+
+
+def anywhere(fingers: str = "3", more: str = "") -> Task:
+    """The ball's task with a palm that the program places."""
+    text = TASK.replace("palm: {position: [0, 0, 0.3], facing: [0, 0, -1]}", "palm: auto")
+    return parse_task(text.replace("FINGERS", fingers) + more)
+
+
+TWO = "{a: {touches: [0.03, 0, 0]}, b: {touches: [-0.03, 0, 0]}}"
+
+
+@pytest.mark.parametrize("fingers", ["3", TWO])
+def test_where_the_palm_was_placed_is_told_and_written(
+    fingers: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    solved_as(monkeypatch, "certified")
+    said: list[str] = []
+    task = anywhere(fingers, "keep_out: [{name: shelf, box: {center: [0, 0, 0.4], size: [0.2, 0.2, 0.02]}}]\n")
+    solve(task, jobs=1, out=tmp_path, progress=lambda news: said.append(news.text))
+    again = Design.load(tmp_path)
+    assert again.task.palm == task.palm
+    told = again.placement["palm"]
+    assert (told["position"], told["facing"]) == (list(task.palm.position), list(task.palm.facing))
+    assert told["keep_out_gaps"]["shelf"] > 0
+    assert any(told["why"] in words for words in said)
+    assert ("sets" in again.placement) == (fingers == "3")
+    with pytest.raises(DesignError, match="holds a certified result of this task already"):
+        solve(task, jobs=1, out=tmp_path)
+
+
+def test_a_palm_that_was_placed_is_kept_where_it_may_stand() -> None:
+    earlier = anywhere(TWO)
+    task = anywhere(TWO).changed(motion=[{"at": 0, "position": [0, 0, 0.22]}, {"at": 2, "position": [0, 0, 0.18]}])
+    assert task.palm != earlier.palm
+    assert stood_like(task, earlier).palm == earlier.palm
+    given = task.changed(palm={"position": [0, 0, 0.3], "facing": [0, 0, -1]})
+    assert stood_like(given, earlier) == given
+    x, y, z = earlier.palm.position
+    boxed = task.changed(keep_out=[{"box": {"center": [x, y, z], "size": [0.02, 0.02, 0.02]}}])
+    assert stood_like(boxed, earlier) == boxed

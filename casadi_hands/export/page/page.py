@@ -74,7 +74,7 @@ def _summary(design: Result, scene: Scene) -> str:
         parts.append(f"longest force arrow {scene.longest_force:.3g} N")
     if design.replays:
         parts.append(design.replay_words)
-    if design.placement and design.hand is not None:
+    if "why" in design.placement and design.hand is not None:
         parts.append(f"contacts placed: {design.placement['why']}")
     return " · ".join(parts)
 
