@@ -76,6 +76,8 @@ def moved(text: str, task: Task, place: Place, position: np.ndarray, rotation: n
     """
     shifted = bool(np.abs(position - place.position).max() > _STEP / 2)
     turned = place.turns and np.degrees(_angle(rotation @ place.rotation.T)) > _LEAST_TURN
+    if place.kind == "palm" and (shifted or turned):
+        text = _standing(text, task)
     if shifted and place.kind == "contact":
         local = place.rotation.T @ (position - _start(task)[0])
         text = with_value(text, place.path, _point(local))
@@ -87,6 +89,19 @@ def moved(text: str, task: Task, place: Place, position: np.ndarray, rotation: n
     elif turned:
         text = _turned_palm(text, task, place, rotation)
     return text
+
+
+def _standing(text: str, task: Task) -> str:
+    """The text with the palm's place written out, where it leaves that to the program."""
+    given = value_at(text, ("palm",))
+    if given == "auto":
+        text = with_value(text, ("palm",), {})
+    elif isinstance(given, dict) and given.get("auto") is True:
+        text = without(text, ("palm", "auto"))
+    else:
+        return text
+    text = with_value(text, ("palm", "position"), _point(np.array(task.palm.position)))
+    return with_value(text, ("palm", "facing"), _direction(np.array(task.palm.facing)))
 
 
 def _turned_goal(text: str, task: Task, place: Place, rotation: np.ndarray) -> str:

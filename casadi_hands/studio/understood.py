@@ -54,6 +54,8 @@ def understand(text: str, path: Path) -> Understood:
         task, questions = parse_questioned(text, path.name, path.stem, path.parent)
     except HandsError as error:
         return Understood(written, tuple(str(error).splitlines()))
+    if written is not None and written.palm.auto:
+        written = written.model_copy(update={"palm": task.palm})
     proposal = None if task.is_placed else propose(task)
     if proposal is not None and proposal.sets:
         task = proposal.sets[0].in_task(task)

@@ -266,3 +266,19 @@ def test_goals_of_an_object_on_a_joint_are_moved_by_their_angle(tmp_path):
     edited.edit(lambda text: with_field(text, ("motion", 1), "{at: 1, angle: 20}"))
     assert edited.understood.refusals == ()
     assert [each.moves for each in places(edited.last.written) if each.path[0] == "motion"] == [True, False]
+
+
+@pytest.mark.parametrize("palm", ["palm: auto\n", "palm: {auto: true, radius: 0.05}\n"])
+def test_a_placed_palm_is_drawn_where_it_stands_and_written_out_once_it_is_dragged(palm, tmp_path):
+    start = CAPSULE.index("palm:")
+    text = CAPSULE[:start] + palm + CAPSULE[CAPSULE.index("\n", start) + 1 :]
+    edited = session(tmp_path, text)
+    stands = place(edited, "palm")
+    assert stands.position == pytest.approx(np.array(parse_task(text).palm.position))
+    assert moved(text, edited.last.written, stands, stands.position, stands.rotation) == text
+    drag(edited, "palm", by=(0.0, 0.0, 0.01))
+    given = value_at(edited.text, ("palm",))
+    assert "auto" not in given
+    assert given["position"] == pytest.approx(stands.position + [0, 0, 0.01], abs=1e-5)
+    assert np.cross(given["facing"], stands.rotation[:, 2]) == pytest.approx(0, abs=1e-3)
+    assert parse_task(edited.text).palm.placed is None
