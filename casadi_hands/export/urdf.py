@@ -21,7 +21,7 @@ from casadi_hands.export.markup import (
     number,
     numbers,
 )
-from casadi_hands.export.meshes import mesh_path, object_solids, polytopes
+from casadi_hands.export.meshes import mesh_path, object_solids, of_raw_meshes, polytopes
 from casadi_hands.geometry.bodies import Solid
 from casadi_hands.problem.inertia import Case, Inertial, body_inertials, servo_cases
 
@@ -73,6 +73,8 @@ def hand_urdf(hand: Hand, world: tuple[Sequence[float], Sequence[float]] | None 
 def object_urdf(task: Task) -> str:
     """The task's object as URDF text: one link ``object`` whose frame is the object frame.
 
+    It looks like the meshes that it was made of, where those are known, and collides as their convex parts do.
+
     Args:
         task: its object gives shapes, mass and inertia.
     """
@@ -80,9 +82,13 @@ def object_urdf(task: Task) -> str:
     link = SubElement(robot, "link", name="object")
     body = task.object
     _add_inertial(link, Inertial(body.mass, np.asarray(body.center_of_mass), np.asarray(body.inertia)))
+    raw = of_raw_meshes(task)
+    for path in dict.fromkeys(raw.values()):
+        mesh = Element("mesh", filename=path)
+        _add_shape(link, "visual", mesh, np.zeros(3), (0.0, 0.0, 0.0), OBJECT_COLOR)
     for name, solid in object_solids(task).items():
         if solid.kind == "convex":
-            for role in ("visual", "collision"):
+            for role in ("collision",) if name in raw else ("visual", "collision"):
                 mesh = Element("mesh", filename=mesh_path(name))
                 _add_shape(link, role, mesh, np.zeros(3), (0.0, 0.0, 0.0), OBJECT_COLOR)
         else:

@@ -13,7 +13,7 @@ from casadi_hands.task.reference import default_text, shape_of
 from casadi_hands.task.shapes import SECTIONS
 from casadi_hands.task.structure import fields_of, sections_in
 
-_WRITTEN_BY_THE_PROGRAM = ("object", "meshes")
+_WRITTEN_BY_THE_PROGRAM = (("object", "meshes"), ("palm", "placed"))
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def _form(title: str, path: Path, section: type[Section], data: Any) -> Form:
     data = data if isinstance(data, Mapping) else {}
     for name, field in fields_of(section).items():
         where = (*path, name)
-        if where == _WRITTEN_BY_THE_PROGRAM:
+        if where in _WRITTEN_BY_THE_PROGRAM:
             continue
         given, below = data.get(name), sections_in(field.annotation)
         if len(below) == 1 and below[0] not in SECTIONS.values() and _opens(where):

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
@@ -15,10 +14,10 @@ from casadi_hands.errors import MeshError
 from casadi_hands.geometry.hull import mass_moments
 from casadi_hands.meshes import Decomposition, convex_parts, mend, read_mesh, scaled, told
 from casadi_hands.task.fields import NonNegative, Positive, Section, Whole
+from casadi_hands.task.raw_mesh import FOLDER, WITHIN, RawMesh, place, raw_path, read_raw
 
+__all__ = ["FOLDER", "WITHIN", "Mesh", "MeshRecord", "Uniform"]
 MOST_PARTS = 64
-FOLDER, WITHIN = "folder", "within"
-"""Of the context that a task is validated in: where relative paths start, and whether all files must be below it."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +55,7 @@ class Mesh(Section):
         json_schema_extra={"default": "that of `convex`"},
     )
     name: str | None = Field(default=None, min_length=1, description="What regions of contacts call all of it.")
+    _raw: RawMesh = PrivateAttr()
     _found: Decomposition = PrivateAttr()
     _solid: Uniform = PrivateAttr()
     _notes: tuple[str, ...] = PrivateAttr()
@@ -63,12 +63,13 @@ class Mesh(Section):
     @model_validator(mode="after")
     def _read(self, info: ValidationInfo) -> Self:
         try:
-            mesh, self._notes = mend(scaled(read_mesh(_place(self.file, info.context or {})), self.scale))
+            mesh, self._notes = mend(scaled(read_mesh(place(self.file, info.context or {})), self.scale))
             self._found = convex_parts(mesh, self.parts)
         except MeshError as error:
             raise PydanticCustomError(
                 "refused", "{allowed}", {"allowed": error.allowed, "given": error.given}
             ) from None
+        self._raw = RawMesh(mesh.vertices, mesh.faces)
         self._solid = Uniform(*mass_moments(mesh.corners))
         return self
 
@@ -82,17 +83,25 @@ class Mesh(Section):
         """What the mesh encloses."""
         return self._solid
 
-    @property
-    def record(self) -> MeshRecord:
-        """What has become of it."""
+    def record(self, number: int, first: int) -> MeshRecord:
+        """What has become of it.
+
+        Args:
+            number: of the mesh among the object's meshes.
+            first: number of its first part among the object's shapes.
+        """
         found = self._found
-        return MeshRecord(
+        record = MeshRecord(
             file=Path(self.file).name,
             parts=len(found.parts),
             leaves_out=found.missing,
             adds=found.added,
             mended=self._notes,
+            first=first,
+            raw=raw_path(number),
         )
+        record._raw = self._raw
+        return record
 
 
 class MeshRecord(Section):
@@ -103,26 +112,37 @@ class MeshRecord(Section):
     leaves_out: NonNegative = Field(description="The most by which it stands out of their union, m; sampled.")
     adds: NonNegative = Field(description="The most by which their union stands out of it, m; sampled.")
     mended: tuple[str, ...] = Field(default=(), description="What was done to it before.")
+    first: Whole | None = Field(default=None, description="The number, from 0, of the first of these shapes.")
+    raw: str | None = Field(
+        default=None,
+        max_length=200,
+        description="The OBJ file, beside the task's, of the mesh before it was cut; m, object frame.",
+    )
+    _raw: RawMesh | None = PrivateAttr(None)
+
+    @model_validator(mode="after")
+    def _read(self, info: ValidationInfo) -> Self:
+        if self.raw is not None:
+            try:
+                self._raw = read_raw(self.raw, info.context or {})
+            except MeshError as error:
+                raise PydanticCustomError(
+                    "refused", "{allowed}", {"allowed": error.allowed, "given": error.given}
+                ) from None
+        return self
+
+    @property
+    def raw_mesh(self) -> RawMesh | None:
+        """The mesh before it was cut, m, object frame; None where its file is not known."""
+        return self._raw
+
+    def moved(self, by: np.ndarray) -> MeshRecord:
+        """The same with the mesh shifted by ``by`` (3,), m."""
+        moved = self.model_copy()
+        moved._raw = self._raw and self._raw.moved(by)
+        return moved
 
     @property
     def sentence(self) -> str:
         """What has become of it, lengths in mm."""
         return "; ".join([*self.mended, told(self.parts, self.leaves_out, self.adds)])
-
-
-def _place(file: str, context: Mapping[str, Any]) -> Path:
-    """Where a file is that a task names.
-
-    Raises:
-        MeshError: outside of the folder, where a task must keep to it.
-    """
-    folder = Path(context.get(FOLDER) or ".")
-    path = folder / file
-    if context.get(WITHIN):
-        try:
-            within = path.resolve().is_relative_to(folder.resolve())
-        except (OSError, RuntimeError, ValueError):
-            within = False
-        if not within:
-            raise MeshError(f"{file!r}", "a file in the task's own folder: a result folder holds all that it needs")
-    return path

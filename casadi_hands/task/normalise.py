@@ -106,6 +106,7 @@ def _recentre(task: Task) -> Task:
 
     moved = {
         "shapes": tuple(shape.moved(-center) for shape in body.shapes),
+        "meshes": body.meshes and tuple(mesh.moved(-center) for mesh in body.meshes),
         "center_of_mass": origin,
         "attached": body.attached and body.attached.moved(-center),
     }

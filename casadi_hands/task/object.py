@@ -38,7 +38,8 @@ def _uniform_inertia(data: dict[str, Any]) -> Matrix:
 
 
 def _records(data: dict[str, Any]) -> tuple[MeshRecord, ...] | None:
-    return tuple(record for shape in data["shapes"] for record in shape.record) or None
+    found = [(first, mesh) for first, shape in enumerate(data["shapes"]) if (mesh := shape.begins) is not None]
+    return tuple(mesh.record(number, first) for number, (first, mesh) in enumerate(found)) or None
 
 
 class ManipulatedObject(Section):

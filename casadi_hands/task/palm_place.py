@@ -129,7 +129,7 @@ def _is_clear(task: Task, palm: Palm, contacts: Touched, at: tuple[Array, Array]
     if np.isfinite(reach):
         tips = (contacts.tips(at, task.hand.link_radius) - position) @ rotation
         from_rim = np.asarray(np.hypot(np.linalg.norm(tips[..., :2], axis=-1) - palm.radius, tips[..., 2]))
-        if contacts.of_groups(from_rim.max(axis=0)).max() > reach:
+        if contacts.of_groups(np.asarray(from_rim.max(axis=0), float)).max() > reach:
             return False
     poses = ((place, nearest_exponential(turn, np.zeros(3))) for turn, place in zip(*at, strict=True))
     return all(depth_in_palm(task.object, *pose, palm) <= -ROOM * palm.radius for pose in poses)
@@ -149,7 +149,8 @@ def _ways_are_free(task: Task, palm: Palm, contacts: Touched, at: tuple[Array, A
         free &= ways[..., 2] >= task.ground.height + radius
     for box in task.keep_out:
         free &= box.distance(ways) >= radius
-    return bool(contacts.of_groups(1.0 - free.all(axis=(0, 2))).max() == 0)
+    blocked = np.asarray(~free.all(axis=(0, 2)), float)
+    return bool(contacts.of_groups(blocked).max() == 0)
 
 
 @dataclass(frozen=True)

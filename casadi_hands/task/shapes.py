@@ -22,7 +22,7 @@ from pydantic import (
 
 from casadi_hands.geometry.bodies import KINDS, Body
 from casadi_hands.task.fields import Positive, Section, Vector, follows, refuse, vector
-from casadi_hands.task.mesh import Mesh, MeshRecord, Uniform
+from casadi_hands.task.mesh import Mesh, Uniform
 from casadi_hands.task.rotation import UPRIGHT, Rotation
 
 MOST_POINTS = 500
@@ -49,9 +49,9 @@ class Primitive(Section):
         return (Uniform(self.body.volume, self.body.centroid, self.body.unit_inertia),)
 
     @property
-    def record(self) -> tuple[MeshRecord, ...]:
-        """What is told of the mesh of which it is the first part."""
-        return (self._part_of[0].record,) if self._part_of is not None and self._part_of[1] == 0 else ()
+    def begins(self) -> Mesh | None:
+        """The mesh of which it is the first part."""
+        return self._part_of[0] if self._part_of is not None and self._part_of[1] == 0 else None
 
     def on_its_own(self) -> None:
         """Forget of which mesh it is a part, once all that follows from the mesh is known."""
@@ -133,6 +133,8 @@ def spelled(section: Any) -> str:
 
 
 SECTIONS: dict[str, Any] = {**{name: _section(kind) for name, kind in KINDS.items()}, "mesh": Mesh}
+# Tasks go to other processes with their sections, which are found there by their names.
+globals().update({section.__name__: section for section in SECTIONS.values()})
 Sphere, Capsule = SECTIONS["sphere"], SECTIONS["capsule"]
 
 

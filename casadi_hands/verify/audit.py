@@ -28,6 +28,7 @@ from casadi_hands.verify.figures.coupling import coupling_figures, motor_speed_f
 from casadi_hands.verify.figures.disturbances import disturbed_figures
 from casadi_hands.verify.figures.dynamics import Shots, between_residual, sample_residual
 from casadi_hands.verify.figures.goals import goal_figures, rest_figure
+from casadi_hands.verify.figures.raw_mesh import raw_mesh_figures
 from casadi_hands.verify.figures.sliding import sliding_figure
 from casadi_hands.verify.figures.stiffness import stability_figures
 from casadi_hands.verify.figures.structure import structure_figures
@@ -103,6 +104,7 @@ def audit_files(directory: str | Path, task: str | Path | None = None) -> Audit:
         slip_figure(folder, path),
         spin_figure(folder, path),
         penetration_figure(folder, path),
+        *raw_mesh_figures(folder, placed),
         joint_figure(folder, path),
         speed_figure(folder, path) if folder.drive is None else motor_speed_figure(folder, folder.drive),
         torque_figure(folder),

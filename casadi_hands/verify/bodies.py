@@ -8,7 +8,8 @@ from functools import cached_property
 import coal
 import numpy as np
 
-from casadi_hands.verify.flat import Box
+from casadi_hands.verify.flat import Box, Convex
+from casadi_hands.verify.raw_mesh import RawMesh
 from casadi_hands.verify.shapes import Capsule, Cylinder, HalfSpace, Shape
 
 _REQUEST = coal.DistanceRequest()
@@ -26,6 +27,8 @@ class Body:
         inertia: (3, 3) kg·m², about the centre of mass, axes of the body frame.
         shapes: the collision geometry, whose union is the body.
         cases: of servos that it holds, which are seen and do not collide: they are in the links that they turn.
+        raw: meshes that it looks like where convex shapes collide in their place.
+        unseen: the shapes that do.
     """
 
     name: str
@@ -34,6 +37,13 @@ class Body:
     inertia: np.ndarray
     shapes: tuple[Shape, ...]
     cases: tuple[Box, ...] = ()
+    raw: tuple[RawMesh, ...] = ()
+    unseen: tuple[Convex, ...] = ()
+
+    @property
+    def seen(self) -> tuple[Shape, ...]:
+        """Those of its shapes that it looks like."""
+        return tuple(shape for shape in self.shapes if not any(shape is other for other in self.unseen))
 
     @property
     def capsules(self) -> tuple[Capsule, ...]:

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import io
+import pickle
 import re
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+import trimesh
 
 from casadi_hands.cli.task_summary import check_summary
 from casadi_hands.errors import TaskError
+from casadi_hands.export.meshes import mesh_files
+from casadi_hands.export.page.robot import object_robot
+from casadi_hands.export.urdf import object_urdf
 from casadi_hands.geometry.hull import mass_moments
 from casadi_hands.meshes import Mesh
 from casadi_hands.task import Task, load_task, parse_task, task_to_yaml
+from casadi_hands.task.raw_mesh import RawMesh
 from tests.meshes.solids import angle, binary_stl, box, inverted, joined, without
 
 TASK = """\
@@ -192,3 +200,74 @@ def test_a_result_folder_reads_no_file_outside(folder: Path) -> None:
         said = message(inside, TASK.replace("parts/angle.stl", outside), within=True)
         allowed = "a file in the task's own folder: a result folder holds all that it needs"
         assert said == f"5: object.shapes[0].mesh: given {outside!r}; allowed: {allowed}"
+
+
+def of_angle(folder: Path, text: str = TASK) -> RawMesh:
+    """The raw mesh of the only one in a task."""
+    (record,) = loaded(folder, text).object.meshes or ()
+    assert record.raw_mesh is not None
+    return record.raw_mesh
+
+
+def test_the_mesh_is_kept_as_it_was_before_it_was_cut(folder: Path) -> None:
+    raw = of_angle(folder)
+    volume, center, _ = mass_moments(angle().corners)
+    found, origin, _ = mass_moments(raw.vertices[raw.faces])
+    assert found == pytest.approx(volume, rel=1e-6)
+    np.testing.assert_allclose(origin, 0, atol=1e-9)  # of the object's frame
+    np.testing.assert_allclose(raw.vertices.min(axis=0), angle().vertices.min(axis=0) - center, atol=1e-7)
+
+
+def test_a_folder_with_the_mesh_beside_its_task_knows_it_again(folder: Path, tmp_path: Path) -> None:
+    task = loaded(folder)
+    result = tmp_path / "result"
+    (result / "meshes").mkdir(parents=True)
+    (result / "task.yaml").write_text(task_to_yaml(task))
+    for name, text in mesh_files(task).items():
+        (result / name).write_text(text)
+    again = load_task(result / "task.yaml", within=True)
+    assert again == task
+    assert (again.object.meshes or ())[0].raw_mesh is not None
+    assert mesh_files(again) == mesh_files(task)
+    assert object_urdf(again) == object_urdf(task)
+    (result / "meshes" / "object_raw0.obj").unlink()
+    assert load_task(result / "task.yaml", within=True) == task
+    (result / "meshes" / "object_raw0.obj").write_text("v 0 0\n")
+    with pytest.raises(TaskError, match=r"object\.meshes\[0\].*: given "):
+        load_task(result / "task.yaml", within=True)
+
+
+def test_it_looks_like_the_mesh_and_collides_as_its_parts(folder: Path) -> None:
+    ball = "\n    - sphere: {center: [0.02, 0.02, 0.02], radius: 0.015}"
+    task = loaded(folder, TASK.replace("scale: 0.001}", "scale: 0.001}" + ball))
+    link = ElementTree.fromstring(object_urdf(task)).find("link")
+    assert link is not None
+    names = {
+        role: sorted(mesh.get("filename", "") for mesh in link.findall(f"{role}/geometry/mesh"))
+        for role in ("visual", "collision")
+    }
+    assert names["visual"] == ["meshes/object_raw0.obj"]
+    assert names["collision"] == ["meshes/object0.obj", "meshes/object1.obj"]
+    assert len(link.findall("visual/geometry/sphere")) == len(link.findall("collision/geometry/sphere")) == 1
+    raw = trimesh.load(io.StringIO(mesh_files(task)["meshes/object_raw0.obj"]), file_type="obj", process=True)
+    assert raw.is_watertight
+    assert raw.volume == pytest.approx(angle().volume, rel=1e-6)
+    (_, drawn) = sorted(object_robot(task).shapes, key=lambda shape: shape.mesh is not None)
+    assert drawn.mesh is not None
+    assert len(drawn.mesh[1]) == len(angle().faces)
+
+
+@pytest.mark.parametrize("shape", ["sphere", "capsule", "box", "cylinder", "mesh"])
+def test_tasks_of_any_shape_go_to_other_processes(shape: str, folder: Path) -> None:
+    given = {
+        "sphere": "{center: [0, 0, 0], radius: 0.02}",
+        "capsule": "{start: [0, 0, -0.01], end: [0, 0, 0.01], radius: 0.02}",
+        "box": "{center: [0, 0, 0], size: [0.04, 0.04, 0.04]}",
+        "cylinder": "{start: [0, 0, -0.01], end: [0, 0, 0.01], radius: 0.02}",
+        "mesh": "{file: parts/angle.stl, scale: 0.001}",
+    }[shape]
+    text = TASK[: TASK.index("fingers:")].replace("mesh: {file: parts/angle.stl, scale: 0.001}", f"{shape}: {given}")
+    task = loaded(folder, text + "fingers: 3\n")
+    again = pickle.loads(pickle.dumps(task))
+    assert again == task
+    assert all((each.raw_mesh is not None) for each in again.object.meshes or ())

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 
-from casadi_hands.export.meshes import mesh_path, polytopes
+from casadi_hands.export.meshes import mesh_path, polytopes, raw_meshes
 from casadi_hands.export.urdf import object_urdf
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ class Robot:
 def object_robot(task: Task) -> Robot:
     """The object as it is exported."""
     meshes = {mesh_path(name): (solid.vertices, solid.triangles) for name, solid in polytopes(task).items()}
-    return Robot(object_urdf(task), meshes)
+    return Robot(object_urdf(task), {**meshes, **raw_meshes(task)})
 
 
 def _without_meshes(urdf: str, meshes: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> tuple[str, list[Shape]]:

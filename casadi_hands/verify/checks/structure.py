@@ -8,6 +8,7 @@ from casadi_hands.verify.checks.commands import command_problems
 from casadi_hands.verify.checks.drive import drive_problems
 from casadi_hands.verify.checks.motion import motion_problems
 from casadi_hands.verify.checks.palm import palm_problems
+from casadi_hands.verify.checks.raw_mesh import raw_mesh_problems
 from casadi_hands.verify.checks.scene import scene_problems
 from casadi_hands.verify.checks.servos import servo_problems
 from casadi_hands.verify.checks.table import table_problems
@@ -33,6 +34,7 @@ def structure_problems(folder: Folder, path: Trajectory) -> list[str]:
         *external_problems(folder),
         *joint_problems(folder),
         *object_problems(folder),
+        *raw_mesh_problems(folder),
         *hand_problems(folder),
         *hand_task_problems(folder, path),
         *servo_problems(folder),

@@ -24,18 +24,32 @@ def read_points(path: Path, name: str) -> np.ndarray:
     Raises:
         DesignError: it is elsewhere, missing, too large, or holds no polytope.
     """
-    parts = PurePosixPath(name).parts
-    if not parts or name.startswith("/") or ".." in parts or ":" in name or not name.endswith(".obj"):
-        raise DesignError(f"{path}: mesh '{name[:60]}' is no .obj file within the folder")
-    file = path.parent.joinpath(*parts)
-    if not file.resolve().is_relative_to(path.parent.resolve()):
-        raise DesignError(f"{path}: mesh '{name[:60]}' leads out of the folder")
+    file = file_within(path, name)
     try:
         lines = [line.split() for line in read_text(file).splitlines()]
         rows = [[float(word) for word in line[1:]] for line in lines if line and line[0] == "v"]
         return hull_points(file, np.array(rows, float).ravel())
     except ValueError as error:
         raise DesignError(f"{file}: not a mesh: {error}") from None
+
+
+def file_within(path: Path, name: str) -> Path:
+    """Return the OBJ file that another file names, in the folder that is in.
+
+    Args:
+        path: of the file that names it.
+        name: relative, as it stands there.
+
+    Raises:
+        DesignError: it is elsewhere, or no OBJ file.
+    """
+    parts = PurePosixPath(name).parts
+    if not parts or name.startswith("/") or ".." in parts or ":" in name or not name.endswith(".obj"):
+        raise DesignError(f"{path}: mesh '{name[:60]}' is no .obj file within the folder")
+    file = path.parent.joinpath(*parts)
+    if not file.resolve().is_relative_to(path.parent.resolve()):
+        raise DesignError(f"{path}: mesh '{name[:60]}' leads out of the folder")
+    return file
 
 
 def hull_points(path: Path, flat: np.ndarray) -> np.ndarray:

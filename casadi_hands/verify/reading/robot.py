@@ -13,8 +13,10 @@ from scipy.spatial.transform import Rotation
 from casadi_hands.errors import DesignError
 from casadi_hands.verify.bodies import Body, joined
 from casadi_hands.verify.flat import Box, Convex
+from casadi_hands.verify.raw_mesh import RawMesh
 from casadi_hands.verify.reading.markup import called, name_of, number, numbers, only, positive, read_xml, strangers
 from casadi_hands.verify.reading.points import read_points
+from casadi_hands.verify.reading.triangles import read_raw_mesh
 from casadi_hands.verify.shapes import Capsule, Cylinder, Shape
 
 
@@ -175,6 +177,8 @@ class _Found:
     spheres: list[Capsule] = field(default_factory=list)
     cylinders: list[Cylinder] = field(default_factory=list)
     flat: list[Box | Convex] = field(default_factory=list)
+    meshes: list[str] = field(default_factory=list)
+    raw: list[RawMesh] = field(default_factory=list)
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
@@ -184,8 +188,13 @@ class _Found:
     @property
     def rows(self) -> list[tuple[float, ...]]:
         """Numbers by which they are compared, in an order of their own."""
+        return self.without([])
+
+    def without(self, unseen: list[Convex]) -> list[tuple[float, ...]]:
+        """The same of all but some."""
+        flat = [shape for shape in self.flat if not any(shape is other for other in unseen)]
         rows = [np.array([shape.radius, *shape.start, *shape.end]) for shape in (*self.spheres, *self.cylinders)]
-        rows += [shape.corners[np.lexsort(shape.corners.T.round(9))].ravel() for shape in self.flat]
+        rows += [shape.corners[np.lexsort(shape.corners.T.round(9))].ravel() for shape in flat]
         return sorted(tuple(np.round(row, 9).tolist()) for row in rows)
 
 
@@ -197,14 +206,19 @@ def _read_link(path: Path, name: str, link: Element) -> tuple[Body, list[str]]:
             strange += strangers(element, "origin geometry material")
             for color in element.iter("color"):
                 numbers(path, color, "rgba", 4)
-            _read_shape(path, name, element, found)
+            _read_shape(path, name, element, found, collides.meshes if found is seen else None)
     seen.cylinders = [cylinder for cylinder in seen.cylinders if not _in_hinge(cylinder, collides.shapes)]
     # Boxes that are only seen are servos.
     cases = [each for each in seen.flat if isinstance(each, Box) and not any(each.agrees(o) for o in collides.flat)]
     seen.flat = [each for each in seen.flat if not any(each is case for case in cases)]
-    if collides.rows != seen.rows:
+    unseen: list[Convex] = []
+    if seen.raw:
+        hulls = [each for each in collides.flat if isinstance(each, Convex)]
+        unseen = [each for each in hulls if not any(each.agrees(other) for other in seen.flat)]
+    if collides.without(unseen) != seen.rows or bool(unseen) != bool(seen.raw):
         strange.append(f"link {name} looks other than it collides: its visual geometry is not its collision geometry")
-    return Body(name, *_inertial(path, name, link), collides.shapes, tuple(cases)), strange
+    inertial, raw = _inertial(path, name, link), tuple(seen.raw)
+    return Body(name, *inertial, collides.shapes, tuple(cases), raw, tuple(unseen)), strange
 
 
 def _in_hinge(cylinder: Cylinder, body: tuple[Shape, ...]) -> bool:
@@ -216,7 +230,8 @@ def _in_hinge(cylinder: Cylinder, body: tuple[Shape, ...]) -> bool:
     return all(float(np.linalg.norm(end)) <= length for end in (cylinder.start, cylinder.end))
 
 
-def _read_shape(path: Path, name: str, element: Element, found: _Found) -> None:
+def _read_shape(path: Path, name: str, element: Element, found: _Found, colliding: list[str] | None) -> None:
+    """Read a shape; a mesh that is seen, and of which none that collides has the file, as triangles."""
     placement, geometry = _placement(path, element), only(path, element, "geometry")
     shape = geometry[0] if geometry is not None and len(geometry) == 1 else None
     if shape is None:
@@ -233,7 +248,13 @@ def _read_shape(path: Path, name: str, element: Element, found: _Found) -> None:
             raise DesignError(f"{path}: link {name}: a side of its box is {sides.min():g} m, not above zero")
         found.flat.append(Box(sides, at, turn))
     elif shape.tag == "mesh":
-        found.flat.append(Convex(read_points(path, shape.get("filename", "")) @ turn.T + at))
+        file = shape.get("filename", "")
+        found.meshes.append(file)
+        if colliding is None or file in colliding:
+            found.flat.append(Convex(read_points(path, file) @ turn.T + at))
+        else:
+            mesh = read_raw_mesh(path, file)
+            found.raw.append(RawMesh(mesh.vertices @ turn.T + at, mesh.faces))
     else:
         raise DesignError(f"{path}: link {name}: its {element.tag} geometry is neither sphere, cylinder, box nor mesh")
 
