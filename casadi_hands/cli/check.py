@@ -24,14 +24,20 @@ def check(
 ) -> None:
     """Check a task file and print how it is understood; solves nothing. Exits 1 where no hand can do the task."""
     from casadi_hands.cli.task_summary import check_summary
+    from casadi_hands.placement.place import propose
     from casadi_hands.task.loader import load_questioned
 
     loaded, questions = load_questioned(task)
-    text, possible = check_summary(loaded, questions)
+    proposal = None if loaded.is_placed else propose(loaded)
+    text, possible = check_summary(loaded, questions, proposal)
     Console().print(text)
     if show is not None:
         from casadi_hands.export.page.task_page import write_task_page
 
-        write_task_page(loaded, show, "not solved" if possible else "not solved; check says why no hand can do this")
+        sets = () if proposal is None else proposal.sets
+        shown = sets[0].in_task(loaded) if sets else loaded
+        words = "not solved" if possible else "not solved; check says why no hand can do this"
+        others = f"; set 1 of {len(sets)} that contacts may be placed by has the large dots" if len(sets) > 1 else ""
+        write_task_page(shown, show, words + others, [each.points for each in sets])
         print(show)
     raise typer.Exit(0 if possible else 1)

@@ -18,17 +18,21 @@ from casadi_hands.task.attached import Attached
 from casadi_hands.task.palm_place import standing
 
 
-def check_summary(task: Task, questions: Sequence[str] = ()) -> tuple[RenderableType, bool]:
+def check_summary(
+    task: Task, questions: Sequence[str] = (), proposal: Proposal | None = None
+) -> tuple[RenderableType, bool]:
     """What `check` prints: every quantity with its unit, lengths in mm, defaults filled in; and why no hand can do it.
 
     Args:
         task: as loaded.
         questions: about what its file may mean otherwise, a line each.
+        proposal: of contacts, where some have no place; found by default.
 
     Returns:
         That, and whether some hand might do the task.
     """
-    proposal = None if task.is_placed else propose(task)
+    if proposal is None and not task.is_placed:
+        proposal = propose(task)
     if proposal is not None and proposal.sets:
         task = proposal.sets[0].in_task(task)
     model = build_model(task)

@@ -22,6 +22,7 @@ from meshcat.geometry import (
 )
 
 from casadi_hands.export.markup import GROUND_COLOR, finger_color
+from casadi_hands.export.page.candidates import draw_candidates
 from casadi_hands.export.page.recorder import recording
 from casadi_hands.export.page.robot import Robot, Shape, object_robot
 from casadi_hands.export.page.shapes import Color, FineSphere, LayeredMesh, two_toned
@@ -91,7 +92,8 @@ def draw_scene(design: Result) -> Scene:
     force = _draw_forces(root, tracks, design.motion, radius) if design.motion else 0.0
     labels: tuple[Label, ...] = ()
     if design.hand is None:
-        contacts = _draw_contacts(root["object"], task, radius)
+        contacts = tuple(_draw_contacts(root["object"], task, radius))
+        contacts = (*contacts, *draw_candidates(root["object"], design.placement, radius))
         labels = (*contacts, *goal_labels(root["goals"], task, GOAL_COLOR))
     if len(timeline.time) > 1:
         recorder.send(SetAnimation(tracks.animation, play=False, repetitions=1))

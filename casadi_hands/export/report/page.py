@@ -19,6 +19,7 @@ from casadi_hands.export.report.data import Panel, panels, plotted, with_command
 from casadi_hands.export.report.dimensions import dimensions_section
 from casadi_hands.export.report.effort import costs_section, motors_section, run_panel
 from casadi_hands.export.report.markup import Html, badge, number, paragraph, section, table, text
+from casadi_hands.export.report.placement import placement_section
 from casadi_hands.export.report.words import in_words, stage_title, status_kind
 
 if TYPE_CHECKING:
@@ -51,6 +52,7 @@ def report_text(design: Result, alternatives: Sequence[Seed] = ()) -> str:
         motors_section(design),
         costs_section(design),
         alternatives_section(list(alternatives)),
+        placement_section(design),
         _made(design),
     ]
     parts = {
