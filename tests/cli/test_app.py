@@ -497,3 +497,20 @@ fingers: 3
     found = run("check", path)
     assert found.exit_code == 1
     assert "no hand can do this: contact 'a' (within 1 mm of [0.0, 0.0, -0.03] m)" in " ".join(found.output.split())
+
+
+def test_check_tells_where_the_palm_was_placed_and_draws_other_sets(tmp_path: Path) -> None:
+    path, page = tmp_path / "ball.yaml", tmp_path / "ball.html"
+    path.write_text(
+        """
+object: {mass: 0.1, shapes: [{sphere: {center: [0, 0, 0], radius: 0.03}}]}
+palm: auto
+motion: [{at: 0, position: [0, 0, 0.22]}, {at: 2, position: [0, 0, 0.2]}]
+fingers: 3
+"""
+    )
+    found = run("check", path, "--show", page)
+    assert found.exit_code == 0
+    assert "placed by the program: contacts are" in " ".join(found.output.split())
+    assert "set 1 of" in page.read_text()
+    assert "finger1 (2)" in page.read_text()

@@ -279,6 +279,6 @@ def test_a_placed_palm_is_drawn_where_it_stands_and_written_out_once_it_is_dragg
     drag(edited, "palm", by=(0.0, 0.0, 0.01))
     given = value_at(edited.text, ("palm",))
     assert "auto" not in given
-    assert given["position"] == pytest.approx(stands.position + [0, 0, 0.01], abs=1e-5)
+    assert given["position"] == pytest.approx(np.add(stands.position, [0, 0, 0.01]), abs=1e-5)
     assert np.cross(given["facing"], stands.rotation[:, 2]) == pytest.approx(0, abs=1e-3)
     assert parse_task(edited.text).palm.placed is None

@@ -23,6 +23,7 @@ from meshcat.geometry import (
 
 from casadi_hands.export.markup import GROUND_COLOR, finger_color
 from casadi_hands.export.page.candidates import draw_candidates
+from casadi_hands.export.page.keep_out import draw_keep_out
 from casadi_hands.export.page.recorder import recording
 from casadi_hands.export.page.robot import Robot, Shape, object_robot
 from casadi_hands.export.page.shapes import Color, FineSphere, LayeredMesh, two_toned
@@ -89,6 +90,7 @@ def draw_scene(design: Result) -> Scene:
     _draw_goals(root["goals"], design, item, radius)
     if task.ground is not None:
         _draw_ground(root["ground"], middle, radius, task.ground.height)
+    draw_keep_out(root["keep_out"], task)
     force = _draw_forces(root, tracks, design.motion, radius) if design.motion else 0.0
     labels: tuple[Label, ...] = ()
     if design.hand is None:

@@ -15,6 +15,7 @@ from casadi_hands.cli.app import app
 from casadi_hands.errors import DesignError
 from casadi_hands.export.page.task_page import write_task_page
 from casadi_hands.task import load_task
+from casadi_hands.task.keep_out import KeepOut
 from tests.documents import ROOT
 from tests.export.browser import Browser, needs_browser
 from tests.export.example import example_design, example_task
@@ -99,3 +100,19 @@ def test_a_browser_puts_the_names_beside_what_they_name(tmp_path):
         assert width > 20
         assert abs(x) < 1
         assert abs(y) < 1
+
+
+def test_boxes_that_the_palm_keeps_off_stand_where_the_task_has_them(tmp_path):
+    turn = {"axis": [0, 0, 1], "degrees": 30}
+    box = {"center": [0.1, -0.2, 0.3], "size": [0.02, 0.04, 0.06], "rotation": turn}
+    task = example_task()
+    task = task.model_copy(update={"keep_out": (KeepOut.model_validate({"box": box}),)})
+    write_task_page(task, tmp_path / "task.html", "not solved")
+    data = page_data(tmp_path / "task.html")
+    poses = placed(data)
+    scale = np.linalg.norm(poses["design"][:3, 0])
+    (path,) = (path for path in poses if "keep_out" in path)
+    start = np.array(task.goal_poses()[0][1])
+    first = poses["design/object"][:3, 3]
+    assert (poses[path][:3, 3] - first) / scale + start == pytest.approx(box["center"], abs=1e-6)
+    assert poses[path][:2, 0] / scale == pytest.approx([np.cos(np.radians(30)), np.sin(np.radians(30))], abs=1e-6)
