@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import yaml
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation as ScipyRotation
 
 from casadi_hands.errors import TaskError
 from casadi_hands.task import load_task, parse_task, task_to_yaml
 from casadi_hands.task.keep_out import KeepOut
+from casadi_hands.task.yamlfile import TaskFile
 from tests.task.test_refusals import GOOD
 
 RADIUS, THICKNESS = 0.05, 0.012
@@ -107,5 +107,5 @@ def _box(center: list[float]) -> dict[str, object]:
 
 
 def _data() -> dict[str, dict[str, object]]:
-    data: dict[str, dict[str, object]] = yaml.safe_load(GOOD)
+    data: dict[str, dict[str, object]] = TaskFile(GOOD, "task").data
     return data

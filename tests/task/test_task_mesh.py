@@ -6,6 +6,7 @@ import io
 import pickle
 import re
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -249,7 +250,7 @@ def test_it_looks_like_the_mesh_and_collides_as_its_parts(folder: Path) -> None:
     assert names["visual"] == ["meshes/object_raw0.obj"]
     assert names["collision"] == ["meshes/object0.obj", "meshes/object1.obj"]
     assert len(link.findall("visual/geometry/sphere")) == len(link.findall("collision/geometry/sphere")) == 1
-    raw = trimesh.load(io.StringIO(mesh_files(task)["meshes/object_raw0.obj"]), file_type="obj", process=True)
+    raw: Any = trimesh.load(io.StringIO(mesh_files(task)["meshes/object_raw0.obj"]), file_type="obj", process=True)
     assert raw.is_watertight
     assert raw.volume == pytest.approx(angle().volume, rel=1e-6)
     (_, drawn) = sorted(object_robot(task).shapes, key=lambda shape: shape.mesh is not None)
