@@ -132,7 +132,7 @@ def test_a_certified_result_is_of_the_task_that_asked_for_its_contacts(
     kept = solve(ball(fingers), jobs=1, out=tmp_path).task
     assert len(kept.fingers) < 6
     for same in (ball(fingers), kept):
-        with pytest.raises(DesignError, match="holds a certified result of this task already; --force"):
+        with pytest.raises(DesignError, match=r"holds a certified result of this task already\n--force"):
             solve(same, jobs=1, out=tmp_path)
     for other in ("5", f"{{finger1: {NEAR}, b: {{touches: anywhere}}}}"):
         with pytest.raises(DesignError, match="holds a certified result of another task"):
