@@ -46,6 +46,21 @@ class RawMesh:
         found = coal.distance(self._tree, still, probe, placed, coal.DistanceRequest(), coal.DistanceResult())
         return max(float(found) + _THIN, 0.0)
 
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        """Return which of points (N, 3) are inside, (N,): those about which its triangles wind.
+
+        By the solid angles that triangles span (van Oosterom and Strackee, 1983).
+        """
+        inside = np.zeros(len(points), bool)
+        for k, point in enumerate(points):
+            a, b, c = (self.vertices[self.faces[:, i]] - point for i in range(3))
+            la, lb, lc = (np.linalg.norm(each, axis=1) for each in (a, b, c))
+            triple = np.einsum("fi,fi->f", a, np.cross(b, c))
+            ab, bc, ca = (np.einsum("fi,fi->f", x, y) for x, y in ((a, b), (b, c), (c, a)))
+            angles = 2 * np.arctan2(triple, la * lb * lc + ab * lc + bc * la + ca * lb)
+            inside[k] = abs(float(angles.sum())) > 2 * np.pi
+        return inside
+
 
 def _frame(axis: np.ndarray) -> np.ndarray:
     """Return a rotation (3, 3) whose third column is a unit axis (3,)."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from xml.etree import ElementTree
 
@@ -13,10 +14,16 @@ import pytest
 import trimesh
 
 from casadi_hands.errors import DesignError
+from casadi_hands.export.meshes import mesh_files
+from casadi_hands.export.urdf import object_urdf
+from casadi_hands.task import load_task
 from casadi_hands.task.mesh import MeshRecord
 from casadi_hands.verify import audit_files
+from casadi_hands.verify.checks.raw_mesh import raw_mesh_problems
 from casadi_hands.verify.raw_mesh import RawMesh
 from casadi_hands.verify.reading.folder import read_folder
+from casadi_hands.verify.reading.robot import read_robot
+from tests.documents import ROOT
 from tests.verify.fixture import RADIUS, Scene, carried
 
 RAW = "meshes/object_raw0.obj"
@@ -134,3 +141,26 @@ def test_distances_of_segments_are_the_least_of_their_points(rng: np.random.Gene
         assert mesh.distance(start, start) == pytest.approx(from_points(start[None])[0], abs=1e-6)
         found += distance > 1e-3
     assert found > 10
+
+
+def test_what_is_inside_is_what_trimesh_has_inside(rng: np.random.Generator) -> None:
+    torus: Any = trimesh.creation.torus(0.05, 0.015, major_sections=24, minor_sections=12)
+    points = rng.uniform([-0.07, -0.07, -0.02], [0.07, 0.07, 0.02], (300, 3))
+    expected = trimesh.proximity.ProximityQuery(torus).signed_distance(points) > 0
+    assert expected.sum() > 30
+    assert (RawMesh(np.array(torus.vertices), np.array(torus.faces)).contains(points) == expected).all()
+
+
+@pytest.mark.parametrize("name", ["mug", "hammer", "toy_brick"])
+def test_objects_that_are_shipped_look_like_what_they_collide_as(name: str, tmp_path: Path) -> None:
+    task = load_task(ROOT / "problems/objects" / f"{name}.yaml")
+    (tmp_path / "meshes").mkdir()
+    for file, text in {**mesh_files(task), "object.urdf": object_urdf(task)}.items():
+        (tmp_path / file).write_text(text)
+    found = read_robot(tmp_path / "object.urdf")
+    body = found.links["object"]
+    assert found.strange == ()
+    assert body.raw
+    assert body.unseen == body.shapes
+    folder: Any = SimpleNamespace(object=body, task=task, length=task.object.characteristic_length)
+    assert raw_mesh_problems(folder) == []

@@ -28,16 +28,11 @@ def raw_mesh_problems(folder: Folder) -> list[str]:
     out = float(np.min([shape.distance(corners) for shape in body.shapes], axis=0).max())
     if out > _MORE * max(record.leaves_out for record in stated) + rounding:
         problems.append(f"object.urdf: what is seen stands out of what collides by {show(out, 'm')}, unstated")
-    hulls = [shape for shape in body.shapes if isinstance(shape, Convex)]
-    reach = _MORE * max(record.adds for record in stated) + rounding
-    outer = [
-        point
-        for shape in hulls
-        for point in shape.corners
-        if all(other is shape or float(other.distance(point)) > rounding for other in body.shapes)
-    ]
-    over = max((min(mesh.distance(p, p) for mesh in body.raw) for p in outer[:_POINTS]), default=0.0)
-    # A corner within the mesh, which it leaves out, is no nearer to its surface than that allows.
-    if over > max(reach, _MORE * max(record.leaves_out for record in stated) + rounding):
+    parts = np.vstack([shape.corners for shape in body.shapes if isinstance(shape, Convex)])
+    outside = parts[~np.any([mesh.contains(parts) for mesh in body.raw], axis=0)]
+    # What else the object is made of may hide where they are.
+    outside = [p for p in outside if all(float(shape.distance(p)) > 0 for shape in body.seen)]
+    over = max((min(mesh.distance(p, p) for mesh in body.raw) for p in outside), default=0.0)
+    if over > _MORE * max(record.adds for record in stated) + rounding:
         problems.append(f"object.urdf: what collides stands out of what is seen by {show(over, 'm')}, unstated")
     return problems
