@@ -5,7 +5,8 @@ from casadi_hands.nlp.failure import SolverError
 from casadi_hands.nlp.kernel import Kernel
 from casadi_hands.nlp.layout import Layout, Parameter, Rows
 from casadi_hands.nlp.problem import Problem
-from casadi_hands.nlp.solver import Options, Solution, Solver
+from casadi_hands.nlp.solution import Solution
+from casadi_hands.nlp.solver import Options, Solver
 
 __all__ = [
     "Constraint",

@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -15,13 +15,15 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from casadi_hands.declared import Term
-from casadi_hands.nlp.failure import SolverError
+from casadi_hands.nlp.failure import SolverError, words_of
 from casadi_hands.nlp.problem import Problem
 from casadi_hands.nlp.program import Program
+from casadi_hands.nlp.solution import Solution
+from casadi_hands.nlp.status import status_of
 from casadi_hands.nlp.watch import Watch
 
 Vector = NDArray[np.float64]
+AT_BOUND = 1e-3  # of a bound, or in units of variables: nearer to it a variable counts as being at it
 
 
 @dataclass(frozen=True)
@@ -59,46 +61,6 @@ class Options:
             **named,
             **dict(self.extra),
         }
-
-
-@dataclass(frozen=True)
-class Solution:
-    """What one solve returned, by name; a solve that stopped early is a value too.
-
-    All numbers are computed at ``values``. A term, objective or violation that is not a number is infinite, so that
-    such a solution ranks last and meets nothing.
-
-    Attributes:
-        values: variable -> array.
-        terms: cost term -> weighted value.
-        objective: sum of the terms.
-        excess: ``kernel.constraint`` -> how far each of its values is beyond its bounds; 0 within.
-        constraints: ``kernel.constraint`` -> its values, one row an instance.
-        status: IPOPT's own words; never taken as proof.
-        iterations: number of iterations; 0 where IPOPT did not start.
-        seconds: wall time.
-        declared: cost term -> as it was declared.
-    """
-
-    values: dict[str, Vector]
-    terms: dict[str, float]
-    objective: float
-    excess: dict[str, Vector] = field(repr=False)
-    constraints: dict[str, Vector] = field(repr=False)
-    status: str
-    iterations: int
-    seconds: float
-    declared: dict[str, Term] = field(default_factory=dict, repr=False)
-
-    @property
-    def violations(self) -> dict[str, float]:
-        """Largest violation of each ``kernel.constraint``."""
-        return {name: float(excess.max(initial=0.0)) for name, excess in self.excess.items()}
-
-    @property
-    def violation(self) -> float:
-        """Largest violation of a constraint."""
-        return max(self.violations.values(), default=0.0)
 
 
 class Solve(NamedTuple):
@@ -177,7 +139,7 @@ class Solver:
         Raises:
             KeyError: a name that is not in the problem, or a parameter left out.
             KeyboardInterrupt: the solve was interrupted.
-            SolverError: IPOPT broke off with an error, which no status of a solution tells.
+            SolverError: IPOPT broke off with an error, or with a status after which there is nothing to judge.
         """
         program = self.program(start, parameters, lower, upper, constraints)
         options = options or Options()
@@ -189,12 +151,15 @@ class Solver:
         try:
             answer = solver(**program.numbers)
         except RuntimeError as error:
-            raise SolverError(f"IPOPT: {error}") from error
+            raise SolverError(f"IPOPT: {words_of(error)}") from error
         seconds = time.perf_counter() - started
         stats = solver.stats()
-        if stats["return_status"] == "NonIpopt_Exception_Thrown" or (watch and watch.interrupted):
+        status = status_of(str(stats["return_status"]))
+        if status.kind == "interrupted" or (watch and watch.interrupted):
             # CasADi turns an interrupt into this status, or into an end that was asked for, and goes on.
             raise KeyboardInterrupt
+        if status.kind == "broken":
+            raise SolverError(f"IPOPT {status.words}")
         solution = self._solution(answer, program, stats, seconds)
         if (kept := _kept.get()) is not None:
             kept.append(Solve(program, options, solution))
@@ -256,6 +221,8 @@ class Solver:
         low, high = (bound - np.where(finite, g, 0.0) for bound in (program.lbg, program.ubg))
         beyond = np.where(finite, np.maximum(np.maximum(low, -high), 0.0), np.inf)
         terms[~np.isfinite(terms)] = np.inf
+        lam_g = np.nan_to_num(np.array(answer["lam_g"], float).reshape(-1))
+        pressed = np.where(program.lbg < program.ubg, np.abs(lam_g), 0.0)
         return Solution(
             values=problem.variables.unpack(x),
             terms=dict(zip(problem.terms, terms.tolist(), strict=True)),
@@ -267,7 +234,23 @@ class Solver:
             iterations=int(stats["iter_count"]) if "iterations" in stats else 0,
             seconds=seconds,
             declared=problem.declared_terms,
+            multipliers={name: pressed[rows] for name, rows in problem.constraint_rows.items()},
+            bound_multipliers=problem.variables.unpack(self._of_bounds(x, program, lam_g)),
         )
+
+    def _of_bounds(self, x: Vector, program: Program, lam_g: Vector) -> Vector:
+        """Sizes of the multipliers of variables' bounds, from the gradient that they have to balance.
+
+        IPOPT's own are the barrier's where it is stopped, however near a variable has come to its bound.
+        """
+        gradient = np.array(self.functions["grad_f"](x, program.p)[1]).reshape(-1)
+        jacobian = self.functions["jac_g"](x, program.p)[1]
+        force = -gradient - np.array(ca.mtimes(jacobian.T, lam_g)).reshape(-1)
+        upper, lower = (
+            np.abs(x - bound) <= AT_BOUND * np.maximum(1.0, np.abs(bound)) for bound in (program.ubx, program.lbx)
+        )
+        sizes = np.where(upper, np.maximum(force, 0.0), 0.0) + np.where(lower, np.maximum(-force, 0.0), 0.0)
+        return np.where(np.isfinite(sizes) & (program.lbx < program.ubx), sizes, 0.0)
 
 
 @cache
