@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from casadi_hands.nlp import Constraint, Solution
 from casadi_hands.problem.hand_motion import WholeHand
+from casadi_hands.stages.refine.tightest import Tightest
 from casadi_hands.stages.refine.values import Margin
 
 
@@ -53,6 +54,7 @@ class Refined:
         weights: of the terms of the motion's solve.
         margin: to keep to the limits, that the motion was solved with.
         homotopy: the parameter that the motion was continued to: 1 where it reaches its goals.
+        tightest: the limit that keeps the worst of them from being met, as far as it can be told.
     """
 
     hand: WholeHand
@@ -65,6 +67,7 @@ class Refined:
     weights: dict[str, float]
     margin: Margin
     homotopy: float = 1.0
+    tightest: Tightest | None = None
 
     @property
     def exact(self) -> bool:

@@ -42,6 +42,7 @@ from casadi_hands.stages.refine.settings import (
     graded,
 )
 from casadi_hands.stages.refine.sliding import SLIP_SCALE
+from casadi_hands.stages.refine.tightest import tightest
 from casadi_hands.stages.refine.values import Margin, RefineValues
 
 
@@ -254,7 +255,8 @@ class RefineStage:
         hopeless = what != "hard constraints"
         met = not hopeless and worst.violation <= ACCEPTED
         barely = hopeless or any(run.what == "stiffer penalty" for run in runs)
-        return Refined(hand, met, worst, slips, hopeless, barely, tuple(runs), weights, margin)
+        tight = None if met else tightest(self.built, solution, worst.constraint)
+        return Refined(hand, met, worst, slips, hopeless, barely, tuple(runs), weights, margin, tightest=tight)
 
     def _worst(self, solution: Solution) -> Worst:
         name, violation = max(solution.violations.items(), key=lambda item: item[1])
