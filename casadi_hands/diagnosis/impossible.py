@@ -16,12 +16,14 @@ from casadi_hands.diagnosis.grasps import grasp_findings
 from casadi_hands.diagnosis.moment import moment
 from casadi_hands.diagnosis.places import place_findings
 from casadi_hands.diagnosis.reason import Reason
+from casadi_hands.problem.inertia import capsule_inertial
 from casadi_hands.problem.loads import Load, hardest_load, usual_force_limit
 from casadi_hands.problem.model import Model
 from casadi_hands.task import Task
 from casadi_hands.task.servos import SERVOS
 from casadi_hands.verify.figures.wrench import LEAST_LEVER
 
+LEAST_INERTIA = 1e-14  # kg·m², that MuJoCo takes
 _HARD = 5.0  # weights, beyond which a contact presses hard
 _USUAL_LEVER = 1.0  # lengths, of the force on a fingertip about some joint of its finger
 
@@ -33,10 +35,11 @@ def findings(task: Task, model: Model) -> list[Finding]:
         task: as loaded.
         model: the same, nondimensional.
     """
+    light = list(_too_light(task))
     if not task.is_placed:  # nothing is known of contacts
-        places = list(place_findings(task, model))
+        places = [*light, *place_findings(task, model)]
         return [each for each in places if each.certain] or places
-    places = [*place_findings(task, model), *fingertip_findings(task, model)]
+    places = [*light, *place_findings(task, model), *fingertip_findings(task, model)]
     forces = [*_too_weak(task, model), *_weak_motors(task, model)]
     every = [*places, *grasp_findings(task, model), *forces]
     # Beside what is certain, the likely may follow from it.
@@ -51,6 +54,27 @@ def impossibilities(task: Task, model: Model) -> list[Reason]:
         model: the same, nondimensional.
     """
     return [each.reason for each in findings(task, model) if each.certain]
+
+
+def _too_light(task: Task) -> Iterator[Finding]:
+    """MuJoCo, in which designs are replayed, does not move bodies as light and small as these."""
+    hand = task.hand
+    link = capsule_inertial(hand.link_length[1] - hand.hinge_length, hand.link_radius, hand.density)
+    bodies = {
+        "the object has": (np.asarray(task.object.inertia), "a larger or heavier object"),
+        "the largest links allowed (hand.link_radius, hand.link_length) have": (
+            link.inertia,
+            "a larger object, or thicker links (hand.link_radius)",
+        ),
+    }
+    for who, (inertia, advice) in bodies.items():
+        least = float(np.linalg.eigvalsh(inertia)[0])
+        if least < LEAST_INERTIA:
+            what = (
+                f"{who} a least moment of inertia of {least:.2g} kg·m², and MuJoCo, in which designs are replayed, "
+                f"moves no body that has less than {LEAST_INERTIA:g} kg·m²"
+            )
+            yield found(what, advice)
 
 
 def _too_weak(task: Task, model: Model) -> Iterator[Finding]:

@@ -17,6 +17,7 @@ from casadi_hands.diagnosis.figures import (
     speed_reason,
     torque_reason,
 )
+from casadi_hands.diagnosis.impossible import LEAST_INERTIA
 from casadi_hands.diagnosis.reason import Reason, format_reasons
 from casadi_hands.export.design import Design
 from casadi_hands.export.folder import write_files
@@ -25,6 +26,7 @@ from casadi_hands.problem.hand import Hand
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.motion import Motion
 from casadi_hands.verify import audit_files, run_replays
+from casadi_hands.verify.replays.simulation import UnplayableError
 from casadi_hands.verify.report import Audit
 
 # Beyond these, where they are also beyond the limits, a motion is none: characteristic lengths, degrees, m·g.
@@ -36,6 +38,7 @@ FEASIBLE = {
     "gap": 0.02,
     "penetration": 0.04,
 }
+_PLAYABLE = f"a larger or a heavier object: MuJoCo moves no body whose inertia is less than {LEAST_INERTIA:g} kg·m²"
 _LENGTHS = ("goal_position", "gap", "penetration")
 
 
@@ -103,7 +106,11 @@ class Judge:
         """
         with tempfile.TemporaryDirectory(dir=self.scratch) as files:
             write_files(design, Path(files), page=False)
-            tried = run_replays(files, jobs=jobs)
+            try:
+                tried = run_replays(files, jobs=jobs)
+            except UnplayableError as error:
+                reason = format_reasons([Reason(f"it cannot be replayed, as MuJoCo says: {error.words}", _PLAYABLE)])
+                return design if design.status == "failed" else replace(design, status="feasible", reason=reason)
         figures = {figure.name: figure for figure in tried.figures()}
         seen = Audit(design.task.name, figures, ())
         judged = replace(design, certificate={**design.certificate, **seen.as_certificate()}, replays=[tried.record()])

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from casadi_hands.diagnosis.impossible import impossibilities
+from casadi_hands.diagnosis.impossible import LEAST_INERTIA, findings, impossibilities
 from casadi_hands.problem.si import build_model
 from casadi_hands.task import load_task, parse_task
 
@@ -136,3 +136,27 @@ def test_motors_that_are_too_weak_with_the_shortest_levers() -> None:
     assert told(more=push + servo + f"actuator: {{torque: {1.001 * least}}}\n") == []
     (text,) = told(more=push + f"actuator: {{torque: {0.99 * least}}}\n")
     assert "and motors give 0.042 N·m (actuator.torque); try stronger motors (actuator.torque), " in text
+
+
+@pytest.mark.parametrize("inertia", [0.9, 1.1])
+def test_what_mujoco_does_not_move_is_told_before_anything_is_solved(inertia: float) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    scene = "<mujoco><worldbody><body><freejoint/><inertial pos='0 0 0' mass='1e-6' diaginertia='{0} {0} {0}'/></body>"
+    moment = inertia * LEAST_INERTIA
+    full = scene.replace("diaginertia='{0} {0} {0}'", "fullinertia='{0} {0} {0} 0 0 0'").format(moment)
+    try:
+        mujoco.MjModel.from_xml_string(f"{full}</worldbody></mujoco>")
+        taken = True
+    except ValueError:
+        taken = False
+    radius = (moment / (0.4 * 1e-6)) ** 0.5
+    text = f"""\
+object: {{mass: 1.0e-6, shapes: [{{sphere: {{center: [0, 0, 0], radius: {radius:.12e}}}}}]}}
+palm: {{position: [0, 0, {4 * radius:.9e}], facing: [0, 0, -1]}}
+motion: [{{at: 0, position: [0, 0, 0]}}, {{at: 2, position: [0, 0, {radius / 5:.9e}]}}]
+fingers: {{thumb: {{touches: [{radius:.9e}, 0, 0]}}, index: {{touches: [-{radius:.9e}, 0, 0]}}}}
+"""
+    task = parse_task(text)
+    told = [each.reason.what for each in findings(task, build_model(task)) if each.certain]
+    assert any(what.startswith("the object has a least moment of inertia") for what in told) is not taken
+    assert any(what.startswith("the largest links allowed") for what in told)

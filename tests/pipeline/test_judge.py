@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from casadi_hands.pipeline import judge
@@ -48,3 +50,20 @@ def test_a_hand_and_its_motion_are_audited_once(monkeypatch: pytest.MonkeyPatch)
     assert len(audits) == 1
     judges.audited(upright(0.0)[1])
     assert len(audits) == 2
+
+
+def test_what_mujoco_does_not_take_is_feasible_and_says_why() -> None:
+    """Links of a tenth of a millimetre have less inertia than MuJoCo moves."""
+    design = upright(0.0)[1]
+    assert design.hand is not None
+    fingers = tuple(
+        replace(finger, links=tuple(replace(link, length=2e-4, radius=5e-5, hinge=1e-4) for link in finger.links))
+        for finger in design.hand.fingers
+    )
+    tiny = replace(design, status="certified", hand=replace(design.hand, fingers=fingers))
+    judged = Judge(*still(0.5)).replayed(tiny)
+    assert judged.status == "feasible"
+    assert judged.reason.startswith("it cannot be replayed, as MuJoCo says: ")
+    assert "inertia" in judged.reason
+    assert "scene.xml" not in judged.reason
+    assert Judge(*still(0.5)).replayed(replace(tiny, status="failed", reason="why")).reason == "why"

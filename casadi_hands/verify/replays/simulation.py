@@ -107,6 +107,18 @@ def continuous(quaternions: np.ndarray) -> np.ndarray:
     return signed
 
 
+class UnplayableError(DesignError):
+    """MuJoCo does not take a scene.
+
+    Attributes:
+        words: why, in its own words, on one line.
+    """
+
+    def __init__(self, file: Path, error: ValueError) -> None:
+        self.words = " ".join(str(error).removeprefix("Error: ").split())
+        super().__init__(f"{file}: MuJoCo does not take it: {self.words}")
+
+
 class Simulation:
     """MuJoCo's model and state of ``scene.xml``, perturbed.
 
@@ -131,7 +143,7 @@ class Simulation:
             # What was read, so that MuJoCo is told nothing else.
             self.model = mujoco.MjModel.from_xml_string(scene.text)
         except ValueError as error:
-            raise DesignError(f"{file}: {error}") from None
+            raise UnplayableError(file, error) from None
         self._find(folder, file)
         self._bias = bias(perturbation, len(folder.motion.joint_names))
         self._perturbation = perturbation
