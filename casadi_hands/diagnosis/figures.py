@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from casadi_hands.diagnosis.holding import firmest, holdings, least_friction, least_torque
-from casadi_hands.diagnosis.moment import moment
+from casadi_hands.diagnosis.moment import moment, real_moment
 from casadi_hands.diagnosis.reason import Reason
 from casadi_hands.diagnosis.shortcoming import WITHOUT_CONTACT
 from casadi_hands.problem.floating_motion import Floating
@@ -68,8 +68,8 @@ def torque_reason(model: Model, design: Result) -> Reason | None:
         return None
     who = f"joint finger{load.finger}_joint{load.joint} of finger '{design.hand.fingers[load.finger].name}'"
     what = (
-        f"{who} needs {load.torque:.3g} N·m at {moment(model.schedule, load.time)} however the hand found shares the "
-        f"load, and the motors give {given:.3g} N·m"
+        f"{who} needs {load.torque:.3g} N·m at {real_moment(model.schedule, load.time)} however the hand found shares "
+        f"the load, and the motors give {given:.3g} N·m"
     )
     advice = "stronger motors (actuator.torque), a lighter object, more friction or a palm nearer by"
     return Reason(what, advice, _HOLDING, root=True)
@@ -86,7 +86,7 @@ def speed_reason(model: Model, design: Result) -> Reason | None:
         return None
     what = (
         f"{_with_finger(f'joint {motion.joint_names[j]}', hand)} turns with {speeds[k, j]:.3g} rad/s at "
-        f"{moment(model.schedule, motion.time[k])} in the motion found, and the motors give {fastest:.3g} rad/s"
+        f"{real_moment(model.schedule, motion.time[k])} in the motion found, and the motors give {fastest:.3g} rad/s"
     )
     return Reason(what, "faster motors (actuator.speed) or slower goals", frozenset(("speed",)))
 

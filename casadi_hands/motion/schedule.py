@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,12 +24,15 @@ class Schedule:
         samples: (S,) s.
         goals: for each goal the index of its keyframe.
         step: s, the half-width of the central differences.
+        holds: keyframes, by their indices in order, at which everything rests and stays for so long, s. Times here pass
+            none of that; `real` and `filled` do.
     """
 
     keyframes: NDArray[np.float64]
     samples: NDArray[np.float64]
     goals: tuple[int, ...]
     step: float
+    holds: tuple[tuple[int, float], ...] = ()
 
     @classmethod
     def of(
@@ -53,12 +56,32 @@ class Schedule:
 
     def stepped(self, step: float) -> Schedule:
         """The same keyframes with samples at most ``step`` seconds apart."""
-        return Schedule(self.keyframes, _samples(self.keyframes.tolist(), step), self.goals, step)
+        return replace(self, samples=_samples(self.keyframes.tolist(), step), step=step)
 
     def halved(self, intervals: NDArray[np.bool_]) -> Schedule:
         """The same with one more sample in the middle of each marked interval (S - 1,) between samples."""
         middles = (self.samples[1:] + self.samples[:-1])[intervals] / 2
-        return Schedule(self.keyframes, np.sort(np.append(self.samples, middles)), self.goals, self.step)
+        return replace(self, samples=np.sort(np.append(self.samples, middles)))
+
+    def real(self, times: ArrayLike) -> NDArray[np.float64]:
+        """Times (T,) with all the time that everything has rested by then; at a keyframe that is held, its first, s."""
+        times = np.asarray(times, float)
+        return times + sum((np.where(times > self.keyframes[k] + 1e-9, rest, 0.0) for k, rest in self.holds), 0.0)
+
+    @property
+    def hold_samples(self) -> NDArray[np.int64]:
+        """Index (H,) of the sample at each keyframe that is held."""
+        return self.keyframe_samples[[k for k, _ in self.holds]]
+
+    def filled(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Real times (R,), s, with samples in holds as elsewhere, and which sample's values (R,) stand there."""
+        times, index = self.real(self.samples), np.arange(len(self.samples))
+        for sample, (_, rest) in zip(self.hold_samples, self.holds, strict=True):
+            count = math.ceil(rest / self.step - 1e-6)
+            times = np.append(times, times[sample] + rest * np.arange(1, count + 1) / count)
+            index = np.append(index, np.full(count, sample))
+        order = np.argsort(times, kind="stable")
+        return times[order], index[order]
 
     @property
     def keyframe_samples(self) -> NDArray[np.int64]:

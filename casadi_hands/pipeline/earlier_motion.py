@@ -25,7 +25,7 @@ NOT_SOLVED = Solution({}, {}, 0.0, {}, {}, "taken from an earlier result", 0, 0.
 
 def earlier_motion(hand: Hand, motion: Motion, old: Model, model: Model) -> WholeHand:
     """The earlier motion as it was, at the samples and in the units of the new task; still of the old reference."""
-    when, length = stretched(old, model), model.units.length
+    when, length = old.schedule.real(stretched(old, model)), model.units.length
     motion = motion_from_si(motion, length, old.units.force)
     between = linear(motion.time, when)
     turns = np.array([matrix(q) for q in motion.object_orientation])

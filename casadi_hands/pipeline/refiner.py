@@ -17,6 +17,7 @@ from casadi_hands.pipeline.rank import AIM, rank_of
 from casadi_hands.pipeline.record import Record
 from casadi_hands.pipeline.steps import adopt
 from casadi_hands.problem.hand_motion import WholeHand
+from casadi_hands.problem.holds import without_holds
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.resampling import resampled, resampled_model
 from casadi_hands.problem.si import design_change
@@ -113,7 +114,8 @@ class Refiner:
         # Fingers that pass through each other do so on any knots.
         while refined.exact and judged.missed & BETWEEN and not stage.passes_through(refined):
             schedule = stage.model.schedule
-            crowded = intervals_to_halve(self.judge.audited(judged), np.diff(schedule.samples))
+            found = self.judge.audited(judged)
+            crowded = intervals_to_halve(found, np.diff(schedule.samples), partial(without_holds, schedule))
             if not crowded.any():
                 break
             finer = resampled_model(stage.model, schedule.halved(crowded))
@@ -201,12 +203,15 @@ class Refiner:
         return design
 
 
-def intervals_to_halve(found: Audit, lengths: Array) -> NDArray[np.bool_]:
+def intervals_to_halve(
+    found: Audit, lengths: Array, of_samples: Callable[[Array], Array] = np.asarray
+) -> NDArray[np.bool_]:
     """The intervals between samples that must be shorter for a motion to keep its limits between samples, too.
 
     Args:
         found: by the audit.
         lengths: (K,) of the intervals, s.
+        of_samples: what was found in each interval of the files, in each of these.
     """
     able = lengths >= 2 * FINEST - 1e-9
     marked = np.zeros(len(lengths), bool)
@@ -215,10 +220,11 @@ def intervals_to_halve(found: Audit, lengths: Array) -> NDArray[np.bool_]:
         if figure.holds or figure.by_interval is None or figure.limit is None:
             continue
         most = ENOUGH * figure.limit
+        by_interval = of_samples(figure.by_interval)
         if name != "slip":
-            marked |= figure.by_interval > most
+            marked |= by_interval > most
             continue
-        for run in figure.by_interval:
+        for run in by_interval:
             gains = (1 - LEFT) * np.where(able, run, 0.0)
             largest = np.argsort(-gains, kind="stable")
             # None where the run slips little, all that slip where halving all of them is not enough.

@@ -221,7 +221,8 @@ def _refine_again(record: Record, model: Model, start: Path) -> Design | None:
 
 def _model(record: Record) -> Model:
     """The task in the stages' numbers, with the person's own terms."""
-    return replace(build_model(record.task), own_terms=record.own_terms)
+    # A person's own terms may ask for the time.
+    return replace(build_model(record.task, whole=bool(record.own_terms)), own_terms=record.own_terms)
 
 
 def _run(record: Record, until: str, executor: Executor | None, jobs: int) -> Design:

@@ -112,5 +112,5 @@ def adopt(record: Record, model: Model, result: WholeHand) -> None:
     motion = whole_hand_motion(model, result)
     if result.coupling is not None:
         hand = replace(hand, drive=drive_of(record.task, model, result))
-        motion = replace(motion, motor_positions=result.coupling.positions)
+        motion = replace(motion, motor_positions=result.coupling.positions[model.schedule.filled()[1]])
     record.update(hand=hand, motion=commanded(record.task, hand, motion))

@@ -17,6 +17,7 @@ from casadi_hands.problem.attachment import MOVING, dry_friction
 from casadi_hands.problem.drive import Drive
 from casadi_hands.problem.floating_motion import Floating
 from casadi_hands.problem.hand_motion import OnJoint, WholeHand
+from casadi_hands.problem.holds import with_holds
 from casadi_hands.problem.model import Model, sampled_points
 from casadi_hands.problem.motion import Motion
 from casadi_hands.problem.motors import shared_motor
@@ -46,14 +47,20 @@ def floating_motion(model: Model, floating: Floating) -> Motion:
     links = ["none"] * model.contacts + (["ground"] if model.ground is not None else [])
     force, nowhere, angles = floating.force * active[:, :, None], np.zeros_like(point), np.zeros((count, 0))
     palm = model.palm_position, model.palm_quaternion
-    return motion_in_si(model, pose[:, :3], pose[:, 3:], *palm, angles, (), names, links, active, force, point, nowhere)
+    rest = angles, (), names, links, active, force, point, nowhere
+    return with_holds(schedule, motion_in_si(model, pose[:, :3], pose[:, 3:], *palm, *rest))
 
 
 def whole_hand_motion(model: Model, result: WholeHand) -> Motion:
-    """The motion of stage 3; each contact's point on the link is the point of its surface nearest the object's.
+    """The motion of stage 3 as it is written.
 
-    A contact without a finger, since it never acts, is left out.
+    Each contact's point on the link is the point of its surface nearest the object's. A contact without a finger, since
+    it never acts, is left out.
     """
+    return with_holds(model.schedule, _at_samples(model, result))
+
+
+def _at_samples(model: Model, result: WholeHand) -> Motion:
     count = len(result.force)
     names = tuple(contact.name for contact in model.contact_table)
     point = np.array([_on_surfaces(p, model) for p in result.point])

@@ -17,6 +17,7 @@ from casadi_hands.motion.quaternion import quaternion
 from casadi_hands.problem.contacts import Contact
 from casadi_hands.problem.hand import Finger, Hand, Link
 from casadi_hands.problem.hand_motion import WholeHand
+from casadi_hands.problem.holds import shortened_task
 from casadi_hands.problem.loads import USUAL_FORCE, usual_force_limit
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.motion import Motion
@@ -34,8 +35,14 @@ _MOST_GAP, _MOST_SLIP = 2e-4, 2e-3
 _SLIDING, _FAR, _PLANNED = 1e-3, 0.02, 0.8
 
 
-def build_model(task: Task) -> Model:
-    """Turn a task into nondimensional numbers; contacts that are not placed yet are left out."""
+def build_model(task: Task, whole: bool = False) -> Model:
+    """Turn a task into nondimensional numbers; contacts that are not placed yet are left out.
+
+    Args:
+        task: as loaded.
+        whole: whether long stretches in which nothing happens are kept, too.
+    """
+    task, holds = (task, ()) if whole else shortened_task(task)
     gravity_size = float(np.linalg.norm(task.gravity))
     acceleration = gravity_size if gravity_size > 0 else STANDARD_GRAVITY
     if task.force_unit > task.object.mass * acceleration:
@@ -45,6 +52,7 @@ def build_model(task: Task) -> Model:
     times, places, turns = zip(*task.palm.waypoints, strict=True)
     goal_times = [goal.at for goal in task.motion]
     schedule = Schedule.of(goal_times, task.duration, task.keyframes_between, task.time_step, times)
+    schedule = replace(schedule, holds=holds)
     bodies = tuple(s.body.measured(lambda lengths: round_off(lengths / length)) for s in task.object.shapes)
     positions, vectors, reference = _goals(task)
     palm_path = PalmPath(np.array(times), round_off(np.array(places) / length), np.array(turns))

@@ -72,8 +72,9 @@ def _bind_newton_euler(of: Declaration) -> None:
 
 
 def _bind_rest(of: Declaration) -> None:
-    """A free object at both ends, where it rests."""
-    exerting, ends = bool(of.structure.model.exerted), np.array([0, of.knots - 1])
+    """A free object at both ends, and where it is held, at rest."""
+    exerting, held = bool(of.structure.model.exerted), of.structure.model.schedule.hold_samples
+    ends = np.unique([0, *held, of.knots - 1])
     still = {"pose": of.pose.take(ends), "wrench": of.wrench.take(ends)}
     given = of.at(ends, "reference", "gravity", *(ANSWER if exerting else ()))
     of.bind(ends, newton_euler.equilibrium(exerting), {"sum": (0, 0)}, **still, **given)

@@ -130,7 +130,7 @@ class RefineValues:
             at, tolerance = schedule.goal_samples, np.repeat(model.goal_tolerance, 3)
             low_pose[at], high_pose[at] = goals - tolerance, goals + tolerance
         rate = np.full((count, 6), np.inf)
-        rate[[0, -1]] = 0.0
+        rate[[0, *schedule.hold_samples, -1]] = 0.0
         most = model.force_limit
         bearing, active = (np.repeat(np.where(f, most, 0.0), 3, axis=1) for f in (self.bearing, self._active))
         upper = {"rate": rate, "force": bearing}
