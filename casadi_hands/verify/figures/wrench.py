@@ -120,7 +120,11 @@ def disturbance_figure(folder: Folder, placed: Placements) -> Figure:
     cones = [_cones(folder, placed, k, budget) for k in range(len(folder.motion.time))]
     joint = held(folder)
     if joint is None:
-        radii = [disturbance_radius(*each) for each in cones]
+        known: dict[tuple[bytes, bytes], float] = {}  # where nothing moves for a while, samples are the same
+        for edges, exerted in cones:
+            if (key := (edges.tobytes(), exerted.tobytes())) not in known:
+                known[key] = disturbance_radius(edges, exerted)
+        radii = [known[edges.tobytes(), exerted.tobytes()] for edges, exerted in cones]
     else:
         scale = np.concatenate([np.full(3, 1.0 / folder.length if joint.turns else 1.0), np.ones(3)])
         twists = along_world(folder, joint) * scale
