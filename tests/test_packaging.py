@@ -66,3 +66,13 @@ def test_the_citation_is_of_this_version() -> None:
     assert citation["version"] == casadi_hands.__version__
     assert citation["license"] == PYPROJECT["project"]["license"]
     assert citation["references"][0]["number"] == "CMU-RI-TR-18-36"
+
+
+def test_what_others_made_is_named_in_a_file_that_every_wheel_has() -> None:
+    third_party = (ROOT / "THIRD_PARTY.md").read_text(encoding="utf-8")
+    assert {"LICENSE", "THIRD_PARTY.md"} <= set(PYPROJECT["project"]["license-files"])
+    extras = PYPROJECT["project"]["optional-dependencies"]
+    needed = [each for name, extra in extras.items() if name != "test" for each in map(Requirement, extra)]
+    unnamed = [each.name for each in [*CORE, *needed] if f"`{each.name}`" not in third_party]
+    built = [each.name for each in BUILD if each.name not in ("scikit-build-core", "nanobind")]
+    assert unnamed + [name for name in [*built, "nanobind"] if name not in third_party] == []

@@ -12,6 +12,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from casadi_hands.export.page.notice import notice
 from casadi_hands.export.page.scene import Scene, draw_scene
 
 if TYPE_CHECKING:
@@ -57,6 +58,7 @@ def page_text(design: Result, time: float | None = None, menu: Sequence[MenuEntr
         ),
         "menu": _menu(menu),
         "design": _data(scene, time),
+        "notice": notice(),
         "meshcat": files("meshcat").joinpath("viewer/dist/main.min.js").read_text(encoding="utf-8"),
     }
     page = files("casadi_hands.export.page").joinpath("page.html").read_text(encoding="utf-8")
