@@ -68,10 +68,12 @@ def with_holds(schedule: Schedule, motion: Motion) -> Motion:
     if not schedule.holds:
         return motion
     times, index = schedule.filled()
-    every = {f.name: getattr(motion, f.name) for f in fields(motion) if f.name != "time"}
-    return replace(
-        motion, time=times, **{name: value[index] for name, value in every.items() if isinstance(value, np.ndarray)}
-    )
+    arrays: dict[str, Any] = {
+        field.name: value[index]
+        for field in fields(motion)
+        if field.name != "time" and isinstance(value := getattr(motion, field.name), np.ndarray)
+    }
+    return replace(motion, time=times, **arrays)
 
 
 def without_holds(schedule: Schedule, values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -47,8 +47,9 @@ def floating_motion(model: Model, floating: Floating) -> Motion:
     links = ["none"] * model.contacts + (["ground"] if model.ground is not None else [])
     force, nowhere, angles = floating.force * active[:, :, None], np.zeros_like(point), np.zeros((count, 0))
     palm = model.palm_position, model.palm_quaternion
-    rest = angles, (), names, links, active, force, point, nowhere
-    return with_holds(schedule, motion_in_si(model, pose[:, :3], pose[:, 3:], *palm, *rest))
+    object_pose = pose[:, :3], pose[:, 3:]
+    motion = motion_in_si(model, *object_pose, *palm, angles, (), names, links, active, force, point, nowhere)
+    return with_holds(schedule, motion)
 
 
 def whole_hand_motion(model: Model, result: WholeHand) -> Motion:
