@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+from importlib.metadata import version
 from pathlib import Path
 
 import environments
 import pytest
+import vulnerable
 
 
 def test_the_lowest_version_of_each_requirement() -> None:
@@ -42,3 +44,12 @@ def test_pinned_versions_hold_for_the_build_too_and_none_come_from_outside(
     assert said.read_text(encoding="utf-8").splitlines() == [
         f"-m pip install --quiet -c {constraints} --build-constraint {constraints} -e ."
     ]
+
+
+def test_all_that_is_needed_in_turn_is_looked_up() -> None:
+    versions = vulnerable.needed(environments.project()["project"]["dependencies"])
+    # pin needs coal's library, meshcat a server of its own.
+    assert {"casadi", "numpy", "pin", "libcoal", "tornado"} <= set(versions)
+    assert versions["numpy"] == version("numpy")
+    assert not {"pytest", "drake"} & set(versions)
+    assert vulnerable.needed(["no-such-package-anywhere>=1"]) == {}
