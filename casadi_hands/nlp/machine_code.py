@@ -14,6 +14,7 @@ import contextlib
 import fcntl
 import hashlib
 import logging
+import multiprocessing
 import os
 import platform
 import shutil
@@ -50,7 +51,9 @@ def compiler() -> str | None:
     names = [os.environ.get("CC", ""), "cc", "gcc", "clang"]
     found = next((path for name in names if name and (path := shutil.which(name))), None)
     if found is None:
-        log.warning("no C compiler found: kernels are interpreted, which is several times slower")
+        # Once is enough: workers' parents need kernels, too.
+        level = logging.WARNING if multiprocessing.parent_process() is None else logging.INFO
+        log.log(level, "no C compiler found: kernels are interpreted, which is several times slower")
     return found
 
 

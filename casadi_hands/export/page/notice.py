@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from functools import cache
 from importlib.resources import files
 
@@ -20,7 +21,10 @@ def notice() -> str:
     if (listed := folder.joinpath(_PARTS)).is_file():
         for part in json.loads(listed.read_text(encoding="utf-8")):
             licence = f"{part['name']} {part['version']}: {part['license']}"
-            copyright_ = _copyright(part.get("licenseText") or "") or str(part.get("author") or "")
+            # Names without addresses: a page that names none can be seen to fetch none.
+            copyright_ = _copyright(part.get("licenseText") or "") or re.sub(
+                r"[<(].*", "", str(part.get("author") or "")
+            )
             lines.append(f"{licence}, {copyright_}" if copyright_ else licence)
     return "\n  ".join(" ".join(line.replace("--", "- -").replace(">", "").split()) for line in lines)
 
