@@ -17,7 +17,7 @@ from casadi_hands.problem.model import Model
 from casadi_hands.problem.structure import Structure
 from casadi_hands.stages.synthesis.stage import AXIS_RANGE
 
-JOINT_MARGIN = 0.005  # rad, so that a smooth curve through the knots stays within the limits between them
+JOINT_MARGIN = 0.005  # rad, at most a quarter of the range: a smooth curve through the knots shall stay within it
 HOLDING = 0.4  # share of its torsion that a contact at rest may need: tips differ, and age
 JOINT_SIZES = {"turn_axis": 3, "joint_axis": 3, "pivot": 3, "joint_start": 3, "advance": 1, "freedom": 6}
 JOINT_SIZES |= {"joint_mass": 1, "joint_friction": 1, "joint_stiffness": 1, "joint_damping": 1}
@@ -84,7 +84,8 @@ class Declaration:
             shape = (len(self.disturbed), width)
             self.force_disturbed = problem.variable("force_disturbed", shape, -most, most, quantity="force")
         lowest, highest = model.joint_limits
-        limits, reach = (lowest + JOINT_MARGIN, highest - JOINT_MARGIN), model.palm_radius
+        margin, reach = min(JOINT_MARGIN, (highest - lowest) / 4), model.palm_radius
+        limits = lowest + margin, highest - margin
         self.angles: list[Rows] = []
         self.shape: list[dict[str, Rows]] = []
         for c, n in zip(structure.contacts, structure.joints, strict=True):

@@ -9,8 +9,12 @@ import pytest
 
 from casadi_hands.diagnosis.refinement import refined_reason
 from casadi_hands.nlp import Solution
+from casadi_hands.problem.si import build_model
+from casadi_hands.stages.refine.stage import RefineStage
 from casadi_hands.stages.refine.tightest import LEAST, Tightest, tightest
+from casadi_hands.task import parse_task
 from tests.stages.refining import MadeUp, carrying
+from tests.stages.synthesis.example import BALL
 
 
 @pytest.fixture(scope="module")
@@ -94,3 +98,12 @@ def test_a_limit_is_told_beside_what_it_keeps_from_being_met(made: MadeUp) -> No
     (reason,) = refined_reason(made.model, made.refined(replace(solution, excess=excess)))
     other = made.model.contact_names[2]
     assert f"; in the way is that finger '{other}' must stay clear of the other bodies at " in reason.what
+
+
+def test_limits_narrower_than_their_margins_leave_joints_a_range() -> None:
+    narrow = "hand: {joint_limits: [-0.001, 0.001]}\n"
+    model = build_model(parse_task(BALL + narrow))
+    stage = RefineStage(model, (0, 1), (1, 2), np.ones((len(model.schedule.samples), 2), bool))
+    bounds = [stage.problem.variables.unpack(side)["angles0"] for side in (stage.problem.lower, stage.problem.upper)]
+    np.testing.assert_allclose(np.rad2deg(bounds[0]), -0.0005)
+    np.testing.assert_allclose(np.rad2deg(bounds[1]), 0.0005)
