@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from meshcat.geometry import MeshLambertMaterial, Sphere
 
-from casadi_hands.export.page.shapes import Color
+from casadi_hands.export.page.names import node_name
+from casadi_hands.export.page.shapes import Color, paint, shift
 from casadi_hands.export.page.unsolved import Label, steps
 
 _SIZE = 0.012  # of the page's scene
@@ -19,18 +20,16 @@ def draw_candidates(node: Any, placement: Mapping[str, Any], radius: float) -> I
     """Draw the contacts of all sets but the chosen one, and name them by finger and set.
 
     Args:
-        node: of the object.
+        node: of the object's contacts.
         placement: as in ``placement.json``.
         radius: of the scene, m.
     """
     for number, points in _others(placement):
         color = COLORS[number % len(COLORS)]
-        paint = sum(round(255 * part) << shift for part, shift in zip(color, (16, 8, 0), strict=True))
         for name, point in points.items():
-            dot, pose = node[f"set{number}_{name}"], np.eye(4)
-            pose[:3, 3] = point
-            dot.set_object(Sphere(_SIZE * radius), MeshLambertMaterial(color=paint))
-            dot.set_transform(pose)
+            dot = node[node_name(f"{name}, set {number}")]
+            dot.set_object(Sphere(_SIZE * radius), MeshLambertMaterial(color=paint(color)))
+            dot.set_transform(shift(point))
             yield Label(steps(dot), f"{name} ({number})", color)
 
 

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from meshcat.geometry import Box, MeshLambertMaterial
 
+from casadi_hands.export.page.names import node_name
+
 if TYPE_CHECKING:
     from casadi_hands.task import Task
 
@@ -18,7 +20,7 @@ def draw_keep_out(node: Any, task: Task) -> None:
     for number, each in enumerate(task.keep_out):
         pose = np.eye(4)
         pose[:3, :3], pose[:3, 3] = each.box.rotation.matrix, each.box.center
-        drawn = node[f"box{number}"]
+        drawn = node[node_name(each.name or f"box {number + 1}")]
         drawn.set_object(
             Box(list(each.box.size)), MeshLambertMaterial(color=_COLOR, opacity=_OPACITY, transparent=True)
         )

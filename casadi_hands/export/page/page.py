@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from importlib.resources import files
@@ -35,7 +35,8 @@ class MenuEntry:
 def write_page(design: Result, path: Path, time: float | None = None, menu: Sequence[MenuEntry] = ()) -> None:
     """Write the page of a design.
 
-    It plays when opened; ``viewer.html#t=1.5`` opens it at 1.5 s, at rest.
+    It plays when opened; ``viewer.html#t=1.5`` opens it at 1.5 s, at rest, and ``viewer.html#still&t=1.5`` without its
+    controls.
 
     Args:
         design: whole or partial; what does not exist is not shown.
@@ -60,9 +61,22 @@ def page_text(design: Result, time: float | None = None, menu: Sequence[MenuEntr
         "design": _data(scene, time),
         "notice": notice(),
         "meshcat": files("meshcat").joinpath("viewer/dist/main.min.js").read_text(encoding="utf-8"),
+        "style": resource("page.css"),
+        "controls": resource("controls.html"),
+        "stage": resource("stage.js"),
+        "script": resource("controls.js"),
     }
-    page = files("casadi_hands.export.page").joinpath("page.html").read_text(encoding="utf-8")
-    return re.sub(r"\{\{(\w+)\}\}", lambda slot: parts[slot[1]], page)
+    return filled("page.html", parts)
+
+
+def resource(name: str) -> str:
+    """A file of this package, as text."""
+    return files("casadi_hands.export.page").joinpath(name).read_text(encoding="utf-8")
+
+
+def filled(name: str, parts: Mapping[str, str]) -> str:
+    """A file of this package with ``{{part}}`` replaced by the part."""
+    return re.sub(r"\{\{(\w+)\}\}", lambda slot: parts[slot[1]], resource(name))
 
 
 def _summary(design: Result, scene: Scene) -> str:
@@ -94,8 +108,13 @@ def _data(scene: Scene, time: float | None) -> str:
     """What the page's script reads, as JSON that cannot end its script element."""
     data = {
         "commands": [b64encode(command).decode("ascii") for command in scene.commands],
-        "eye": scene.eye.tolist(),
+        "views": [{"name": name, "eye": eye.tolist()} for name, eye in scene.views.items()],
+        "radius": scene.radius,
+        "hand": scene.hand,
+        "ground": scene.ground,
+        "layers": [layer.as_data() for layer in scene.layers],
         "span": [float(scene.time[0]), float(scene.time[-1])],
+        "samples": scene.time.tolist(),
         "start": time,
         "labels": [label.as_data() for label in scene.labels],
     }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
@@ -49,6 +49,15 @@ class Shape:
         return replace(self, radius=_THINNER * self.radius, sides=sides, mesh=mesh)
 
     @property
+    def kind(self) -> str:
+        """What it is, in a word or two."""
+        if self.mesh is not None:
+            return "convex part"
+        if self.sides is not None:
+            return "box"
+        return "sphere" if self.length is None else "cylinder"
+
+    @property
     def reach(self) -> float:
         """Radius of the sphere about the shape's centre that holds it, m."""
         return float(np.hypot(self.radius, (self.length or 0.0) / 2))
@@ -63,6 +72,7 @@ class Robot:
 
     Attributes:
         parents: each link's parent link, parents first; the root's is None.
+        axes: (3,) of the joint that moves each link, unit length, in the link's frame; of those that are moved.
         shapes: the visual primitives of all links.
     """
 
@@ -73,6 +83,7 @@ class Robot:
         self._data = self._model.createData()
         self._frames = [(k, frame) for k, frame in enumerate(self._model.frames) if frame.type == pin.FrameType.BODY]
         self.parents = {frame.name: self._parent(frame) for _, frame in self._frames}
+        self.axes = dict(_axes(urdf))
         visuals = pin.buildGeomFromUrdfString(self._model, urdf, pin.GeometryType.VISUAL)
         self.shapes = (*(self._shape(item) for item in visuals.geometryObjects), *drawn)
 
@@ -115,6 +126,15 @@ def object_robot(task: Task) -> Robot:
     """The object as it is exported."""
     meshes = {mesh_path(name): (solid.vertices, solid.triangles) for name, solid in polytopes(task).items()}
     return Robot(object_urdf(task), {**meshes, **raw_meshes(task)})
+
+
+def _axes(urdf: str) -> Iterator[tuple[str, np.ndarray]]:
+    """Links that joints move, and the joints' axes (3,); URDF gives them in the frame of the link moved."""
+    for joint in ElementTree.fromstring(urdf).iter("joint"):
+        child, axis = joint.find("child"), joint.find("axis")
+        if child is not None and axis is not None and joint.get("type") != "fixed":
+            direction = np.array([float(part) for part in axis.get("xyz", "").split()])
+            yield child.get("link", ""), direction / np.linalg.norm(direction)
 
 
 def _without_meshes(urdf: str, meshes: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> tuple[str, list[Shape]]:

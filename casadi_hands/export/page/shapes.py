@@ -11,8 +11,23 @@ from casadi_hands.export.page.robot import Shape
 
 Color = tuple[float, float, float]
 
+# A three.js cylinder stands along y.
+UPRIGHT_CYLINDER = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 _STEPS = 10  # mesh cells along each side of a patch; a patch spans a quarter turn
 _DIGITS = 4  # to which normals are equal, and middles of faces between octants
+
+
+def shift(offset: np.ndarray) -> np.ndarray:
+    """Pose (4, 4) that moves by an offset (3,)."""
+    pose = np.eye(4)
+    pose[:3, 3] = offset
+    return pose
+
+
+def paint(color: Color) -> int:
+    """A colour, RGB in 0..1, as three.js takes it."""
+    red, green, blue = (round(255 * part) for part in color)
+    return red << 16 | green << 8 | blue
 
 
 class FineSphere(Sphere):  # type: ignore[misc]

@@ -70,6 +70,14 @@ def towards(direction: np.ndarray) -> np.ndarray:
     return np.array(pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), direction).coeffs())
 
 
+def along(direction: np.ndarray) -> np.ndarray:
+    """Pose (4, 4) of the shortest turn that takes z to a direction (3,)."""
+    pose = np.eye(4)
+    x, y, z, w = towards(direction)
+    pose[:3, :3] = pin.Quaternion(w, x, y, z).matrix()
+    return pose
+
+
 def _carried(values: np.ndarray, valid: np.ndarray) -> np.ndarray:
     """Rows (S, 3), each invalid one replaced by the valid one before it, else the first valid; z if there is none."""
     if not valid.any():

@@ -65,9 +65,9 @@ def goal_labels(node: Any, task: Task, color: Color) -> Iterator[Label]:
     size = task.object.characteristic_length
     alone = [[number] for number in range(len(task.motion))]
     groups = alone if task.tool is not None else distinct_goals(goal_poses(task), 1e-6 * size)
-    for drawn, group in enumerate(groups):
+    for group in groups:
         words = ", ".join("start" if number == 0 else f"{task.motion[number].at:g} s" for number in group)
-        yield Label(steps(node[f"goal{drawn}"]), words, color)
+        yield Label(steps(node[f"goal {group[0] + 1}"]), words, color)
 
 
 def bare_palm(design: Result) -> Hand:

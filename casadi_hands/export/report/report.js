@@ -166,7 +166,7 @@
   }
 
   // Added to the viewer's page: what this page says already is left out, and pictures are taken.
-  const ADDED = `<style>#about h1, #about p, .dg { display: none !important; }</style>
+  const ADDED = `<style>#about h1, #about p, #parts { display: none !important; }</style>
 <script>window.picture = () => { viewer.renderer.render(viewer.scene, viewer.camera); return viewer.renderer.domElement.toDataURL("image/jpeg", 0.85); };<\/script></body>`;
   async function open() {
     const packed = Uint8Array.from(atob(document.getElementById("scene").textContent), (c) => c.charCodeAt(0));

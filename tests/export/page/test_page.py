@@ -60,6 +60,7 @@ def test_every_link_moves_as_the_exported_hand_does(page):
     moving, motion = tracks(commands), example_motion()
     model = pin.buildModelFromXML(hand_urdf(example_hand()))
     data = model.createData()
+    names = [finger.name for finger in example_hand().fingers]
     for k in (0, 7, 20):
         configuration = pin.neutral(model)
         for name, angle in zip(motion.joint_names, motion.joint_angles[k], strict=True):
@@ -68,8 +69,8 @@ def test_every_link_moves_as_the_exported_hand_does(page):
         palm = matrix(moving["/design/palm"], k)
         assert palm[:3, 3] == pytest.approx(motion.base_position[k])
         for i in range(3):
-            first = palm @ matrix(moving[f"/design/palm/finger{i}_link0"], k)
-            second = first @ matrix(moving[f"/design/palm/finger{i}_link0/finger{i}_link1"], k)
+            first = palm @ matrix(moving[f"/design/palm/{names[i]} link 1"], k)
+            second = first @ matrix(moving[f"/design/palm/{names[i]} link 1/{names[i]} link 2"], k)
             for j, pose in enumerate((first, second)):
                 expected = data.oMf[model.getFrameId(f"finger{i}_link{j}")].homogeneous
                 assert pose == pytest.approx(palm @ expected, abs=1e-12)
@@ -91,12 +92,12 @@ def test_arrows_end_at_contacts_point_along_forces_and_hide_without_one(tmp_path
     path = tmp_path / "viewer.html"
     write_page(replace(example_design(), motion=replace(motion, contact_active=active, contact_force=force)), path)
     moving = tracks(embedded(path)[1])
-    arrow = moving["/design/object/force_index"]
+    arrow = moving["/design/object/forces/at index"]
     assert arrow["visible"][1].tolist() == active[:, 1].tolist()
     assert arrow["position"][1][5] == pytest.approx(motion.contact_point_object[5, 1])
     lengths = {}
     for name, c in (("thumb", 0), ("index", 1)):
-        node = f"/design/object/force_{name}"
+        node = f"/design/object/forces/at {name}"
         world = matrix(moving["/design/object"], 5) @ matrix(moving[node], 5)
         assert world[:3, 2] == pytest.approx(force[5, c] / np.linalg.norm(force[5, c]), abs=1e-9)
         shaft, position = moving[f"{node}/shaft"]["scale"][1][5], moving[f"{node}/shaft"]["position"][1][5]
@@ -110,9 +111,9 @@ def test_each_goal_pose_has_one_ghost(page):
     placed = {
         command["path"]: np.reshape(command["matrix"], (4, 4)).T
         for command in commands
-        if command["type"] == "set_transform" and re.fullmatch(r"/design/goals/goal\d", command["path"])
+        if command["type"] == "set_transform" and re.fullmatch(r"/design/goals/goal \d", command["path"])
     }
-    assert [placed[f"/design/goals/goal{k}"][0, 3] for k in range(2)] == [0.075, 0.115]
+    assert [placed[f"/design/goals/goal {k}"][0, 3] for k in (1, 2)] == [0.075, 0.115]
     assert len(placed) == 2
 
 
@@ -176,7 +177,7 @@ def test_a_design_without_motion_stands_still(tmp_path):
     assert data["span"] == [0, 0]
     assert {command["type"] for command in commands} == {"set_object", "set_transform"}
     drawn = {command["path"] for command in commands if command["type"] == "set_object"}
-    assert any(path.startswith("/design/palm/finger2_link0/finger2_link1/") for path in drawn)
+    assert any(path.startswith("/design/palm/middle link 1/middle link 2/") for path in drawn)
 
 
 def test_a_page_can_open_at_a_time(tmp_path):

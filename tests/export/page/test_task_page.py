@@ -111,7 +111,7 @@ def test_boxes_that_the_palm_keeps_off_stand_where_the_task_has_them(tmp_path):
     data = page_data(tmp_path / "task.html")
     poses = placed(data)
     scale = np.linalg.norm(poses["design"][:3, 0])
-    (path,) = (path for path in poses if "keep_out" in path)
+    (path,) = (path for path in poses if path.endswith("keep out/box 1"))
     start = np.array(task.goal_poses()[0][1])
     first = poses["design/object"][:3, 3]
     assert (poses[path][:3, 3] - first) / scale + start == pytest.approx(box["center"], abs=1e-6)
