@@ -12,11 +12,12 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from browser import MISSING, browser, screenshot
 from cards import page
 from entries import REPLAYS, Entry, entry_of, figures_of
 from shared import NOTHING, kept_solve, options_of, table_text
 from tables import add_json, write_record
+
+from casadi_hands.export.browser import MISSING, browser, screenshot
 
 PAGE = "gallery.html"
 PICTURE = (1110, 1538)

@@ -10,10 +10,10 @@ from __future__ import annotations
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from browser import screenshot
 from PIL import Image
 from shared import options_of
 
+from casadi_hands.export.browser import screenshot
 from casadi_hands.export.design import Design
 from casadi_hands.export.page.page import write_page
 
@@ -43,7 +43,7 @@ def drawn(folder: Path, time: float, size: tuple[int, int]) -> Image.Image:
     with TemporaryDirectory() as place:
         page, picture = Path(place) / "page.html", Path(place) / "page.png"
         write_page(Design.load(folder), page, time)
-        screenshot(page.as_uri(), picture, size)
+        screenshot(f"{page.as_uri()}#still", picture, size)
         return Image.open(picture).convert("RGB")
 
 

@@ -2,40 +2,17 @@
 
 from __future__ import annotations
 
-import json
-import re
-from base64 import b64decode
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
-from browser import content
 
-from casadi_hands.errors import HandsError
 from casadi_hands.export.design import Design
-from casadi_hands.export.page.page import page_text
+from casadi_hands.export.page.film import pictures
 
 MOMENTS = 5
 """Pictures of a motion, evenly in time, start and end among them."""
 SIZE = (528, 396)
 """Width and height, pixels."""
-_START = b"RIFF"
-# Draws each moment as the page's own fragment shows it, and leaves the pictures where they can be read.
-_DRAW = """
-<script>
-viewer.renderer.setPixelRatio(1);
-viewer.renderer.setSize(WIDTH, HEIGHT);
-viewer.camera.aspect = WIDTH / HEIGHT;
-viewer.camera.updateProjectionMatrix();
-const stills = TIMES.map((time) => {
-  location.hash = `t=${time}`;
-  if (window.onhashchange) window.onhashchange();
-  viewer.render();
-  return viewer.renderer.domElement.toDataURL("image/webp", 0.9);
-});
-document.body.replaceChildren(Object.assign(document.createElement("pre"), {textContent: JSON.stringify(stills)}));
-</script>
-</body>"""
 
 
 def kept_stills(design: Design, folder: Path) -> list[tuple[float, bytes]]:
@@ -81,13 +58,4 @@ def stills(design: Design, times: list[float]) -> list[bytes]:
     Raises:
         HandsError: there is no browser, or it cannot draw; the message says which.
     """
-    draw = _DRAW.replace("TIMES", json.dumps(times)).replace("WIDTH", str(SIZE[0])).replace("HEIGHT", str(SIZE[1]))
-    before, _, after = page_text(design, times[0]).rpartition("</body>")
-    with TemporaryDirectory() as place:
-        page = Path(place) / "stills.html"
-        page.write_text(before + draw + after, encoding="utf-8")
-        drawn = re.search(r"<pre>(.*?)</pre>", content(page), re.DOTALL)
-    pictures = [b64decode(each.partition("base64,")[2]) for each in json.loads(drawn[1])] if drawn else []
-    if len(pictures) != len(times) or not all(picture.startswith(_START) for picture in pictures):
-        raise HandsError("the browser drew no pictures of the page: does it have WebGL (chrome://gpu)?")
-    return pictures
+    return pictures(design, times, SIZE, "webp")

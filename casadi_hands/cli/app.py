@@ -15,6 +15,7 @@ from casadi_hands.cli.check import check
 from casadi_hands.cli.options import Folder, Jobs, Seed, Stage, TaskFile
 from casadi_hands.cli.starting import examples, fields, new, schema
 from casadi_hands.cli.studio import studio
+from casadi_hands.cli.view import view
 
 app = typer.Typer(
     name="casadi-hands",
@@ -143,14 +144,7 @@ def formulate(
 
 app.command(epilog="Example: `casadi-hands check task.yaml --show task.html`")(check)
 app.command(epilog="Example: `casadi-hands studio task.yaml`")(studio)
-
-
-@app.command(epilog="Example: `casadi-hands view results/task`")
-def view(folder: Folder) -> None:
-    """Open a design's page in the browser, made anew where it is not what the folder's other files give."""
-    from casadi_hands.export.page.own_page import open_page
-
-    print(open_page(folder))
+app.command(epilog="Example: `casadi-hands view results/task`, or `… view results/task --gif task.gif`")(view)
 
 
 @app.command(epilog="Example: `casadi-hands report results/task`")

@@ -13,7 +13,8 @@ from types import TracebackType
 from typing import Any
 
 import pytest
-from browser import MISSING, browser
+
+from casadi_hands.export.browser import MISSING, browser
 
 CHROMIUM = browser()
 needs_browser = pytest.mark.skipif(CHROMIUM is None, reason=MISSING)

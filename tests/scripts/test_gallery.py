@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 from apart import ENDED
-from browser import MISSING, browser
 from entries import Entry, entry_of, figures_of
 from gallery import HEAD, main, row, write_all
 from PIL import Image
@@ -18,6 +17,7 @@ from shared import result_folder, table_text, with_seed
 from stills import MOMENTS, SIZE
 
 from casadi_hands import load_task
+from casadi_hands.export.browser import MISSING, browser
 from tests.export.example import TASK, example_design
 
 RUNS = [

@@ -3,10 +3,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from browser import MISSING, browser
 from pictures import main, tiled
 from PIL import Image
 
+from casadi_hands.export.browser import MISSING, browser
 from tests.export.example import example_design
 
 COLORS = ((255, 0, 0), (0, 255, 0), (0, 0, 255))

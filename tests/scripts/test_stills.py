@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from browser import MISSING, browser
 from PIL import Image
 from stills import SIZE, stills
 
 from casadi_hands.errors import HandsError
+from casadi_hands.export.browser import MISSING, browser
 from casadi_hands.export.design import Design
 from casadi_hands.export.page.scene import eye_towards
 from tests.export.example import example_hand, example_motion, example_task
@@ -46,6 +46,6 @@ def test_the_object_moves_as_the_camera_must_see_it() -> None:
 
 
 def test_a_browser_that_draws_nothing_is_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("stills.content", lambda page: "<html></html>")
+    monkeypatch.setattr("casadi_hands.export.page.film.content", lambda page: "<html></html>")
     with pytest.raises(HandsError, match="WebGL"):
         stills(Design(example_task(), "failed"), [0.0])

@@ -96,7 +96,9 @@ function controls(stages) {
     event.preventDefault();
     steps[event.key]();
   };
-  for (const stage of stages) if (stage.onkey) stage.onkey(window.onkeydown);
+  for (const stage of stages) {
+    if (stage.window !== window) stage.window.addEventListener("keydown", window.onkeydown);
+  }
   show();
   jump();
   requestAnimationFrame(step);

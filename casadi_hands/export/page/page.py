@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import re
 from base64 import b64encode
@@ -17,6 +18,14 @@ from casadi_hands.export.page.scene import Scene, draw_scene
 
 if TYPE_CHECKING:
     from casadi_hands.problem.result import Result
+
+
+_START = """
+// The tree of all that is drawn, for who looks for one part.
+document.getElementById("parts").append(viewer.gui.domElement);
+viewer.gui.open();
+controls([stage]);
+"""
 
 
 @dataclass(frozen=True)
@@ -47,11 +56,22 @@ def write_page(design: Result, path: Path, time: float | None = None, menu: Sequ
     path.write_text(page_text(design, time, menu), encoding="utf-8")
 
 
-def page_text(design: Result, time: float | None = None, menu: Sequence[MenuEntry] = ()) -> str:
-    """The page of a design, the same for the same design; arguments as of `write_page`."""
+def page_text(
+    design: Result, time: float | None = None, menu: Sequence[MenuEntry] = (), within: str | None = None
+) -> str:
+    """The page of a design, the same for the same design.
+
+    Args:
+        design: as of `write_page`.
+        time: likewise.
+        menu: likewise.
+        within: for a page that stands in another one, which has the controls, its heading.
+    """
     scene = draw_scene(design)
     parts = {
         "title": escape(design.task.name),
+        "heading": escape(within or design.task.name),
+        "kind": "" if within is None else ' class="bare"',
         "summary": escape(_summary(design, scene)),
         "legend": "".join(
             f'<li style="--color: rgb({", ".join(str(round(255 * part)) for part in color)})">{escape(name)}</li>'
@@ -62,9 +82,9 @@ def page_text(design: Result, time: float | None = None, menu: Sequence[MenuEntr
         "notice": notice(),
         "meshcat": files("meshcat").joinpath("viewer/dist/main.min.js").read_text(encoding="utf-8"),
         "style": resource("page.css"),
-        "controls": resource("controls.html"),
+        "controls": "" if within else resource("controls.html"),
         "stage": resource("stage.js"),
-        "script": resource("controls.js"),
+        "script": "" if within else f"<script>{resource('controls.js')}{_START}</script>\n",
     }
     return filled("page.html", parts)
 
@@ -93,6 +113,11 @@ def _summary(design: Result, scene: Scene) -> str:
     if "why" in design.placement and design.hand is not None:
         parts.append(f"contacts placed: {design.placement['why']}")
     return " · ".join(parts)
+
+
+def packed(page: str) -> str:
+    """A page as another holds it: gzip in base64, the same bytes for the same page."""
+    return b64encode(gzip.compress(page.encode("utf-8"), mtime=0)).decode("ascii")
 
 
 def _menu(entries: Sequence[MenuEntry]) -> str:

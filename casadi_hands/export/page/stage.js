@@ -6,7 +6,7 @@ for (const command of design.commands) {
   viewer.handle_command_bytearray(Uint8Array.from(atob(command), (c) => c.charCodeAt(0)));
 }
 const stage = { span: design.span, samples: design.samples, layers: design.layers, views: design.views,
-  start: design.start, radius: design.radius };
+  start: design.start, radius: design.radius, window };
 
 // One lamp over the camera's shoulder that casts shadows, little light from elsewhere; directions are in meshcat's
 // scene, z up.
@@ -73,7 +73,10 @@ function look(eye) {
 look(seen);
 // Unless it was turned by hand, it fills the window when that changes, too.
 window.addEventListener("resize", () => { if (viewer.camera.position.distanceTo(stood) < 1e-6) look(seen); });
-stage.look = (name) => look(design.views.find((view) => view.name === name).eye);
+stage.look = (name) => {
+  const view = stage.views.find((each) => each.name === name);
+  if (view) look(view.eye);
+};
 stage.fit = (times) => { share = times; look(seen); };
 stage.turned = (follow) => viewer.controls.addEventListener("change", () => {
   follow(viewer.camera.position.toArray(), viewer.controls.target.toArray(), share);

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import gzip
 import json
 import re
-from base64 import b64encode
 from collections.abc import Sequence
 from html import escape
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from casadi_hands.export.page.page import page_text
+from casadi_hands.export.page.page import packed, page_text
 from casadi_hands.export.report.alternatives import Seed, alternatives_section
 from casadi_hands.export.report.checks import audit_section, replay_section
 from casadi_hands.export.report.data import Panel, panels, plotted, with_commands
@@ -64,7 +62,7 @@ def report_text(design: Result, alternatives: Sequence[Seed] = ()) -> str:
             for name, title in re.findall(r'<section id="(\w+)"><h2>([^<]*)</h2>', "".join(sections))
         ),
         "data": json.dumps(_data(design, found), allow_nan=False).replace("<", "\\u003c"),
-        "viewer": b64encode(gzip.compress(page_text(design).encode("utf-8"), mtime=0)).decode("ascii"),
+        "viewer": packed(page_text(design)),
         "licence": _file("vendor/uPlot.LICENSE").strip(),
         "plot_style": _file("vendor/uPlot.min.css"),
         "style": _file("report.css"),
