@@ -6,7 +6,7 @@ for (const command of design.commands) {
   viewer.handle_command_bytearray(Uint8Array.from(atob(command), (c) => c.charCodeAt(0)));
 }
 const stage = { span: design.span, samples: design.samples, layers: design.layers, views: design.views,
-  start: design.start, radius: design.radius, window };
+  start: design.start, radius: design.radius, viewer, window };
 
 // One lamp over the camera's shoulder that casts shadows, little light from elsewhere; directions are in meshcat's
 // scene, z up.

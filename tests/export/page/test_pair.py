@@ -51,21 +51,19 @@ def test_the_page_of_two_folders_is_written_and_opened(tmp_path, opened):
 def test_both_move_by_one_clock_and_are_seen_by_one_camera(tmp_path):
     path = tmp_path / "pair.html"
     path.write_text(pair_text(example_design(), longer(), ("a", "b")))
-    inner = (
-        "[...document.querySelectorAll('iframe')].map((frame) => frame.contentWindow.eval('({viewer, stage, design})'))"
-    )
+    inner = "[...document.querySelectorAll('iframe')].map((frame) => frame.contentWindow.stage)"
     with Browser() as browser:
         browser.open(path, 1000, 600)
         browser.wait("document.querySelectorAll('#views button').length === 4")
 
         def each(expression):
-            return browser.evaluate(f"{inner}.map(({{viewer, stage, design}}) => {expression})")
+            return browser.evaluate(f"{inner}.map((stage) => {expression})")
 
         def drawn():
-            found = each("(viewer.render(), viewer.renderer.domElement.toDataURL())")
+            found = each("(stage.viewer.render(), stage.viewer.renderer.domElement.toDataURL())")
             return [np.asarray(Image.open(io.BytesIO(b64decode(one.partition("base64,")[2]))), float) for one in found]
 
-        place = "viewer.scene_tree.find(['design', 'object']).object.position.toArray()"
+        place = "stage.viewer.scene_tree.find(['design', 'object']).object.position.toArray()"
         browser.evaluate("location.hash = '#t=1'")
         browser.wait(f"{CLOCK} === 1")
         motion = example_motion()
@@ -78,7 +76,7 @@ def test_both_move_by_one_clock_and_are_seen_by_one_camera(tmp_path):
         assert browser.evaluate("document.getElementById('clock').textContent") == "4.00 / 4.00 s"
         assert each(place)[0] == pytest.approx(motion.object_position[20])
         # From one side, and from as far in metres.
-        eyes = "viewer.camera.position.toArray().map((part) => part * design.radius)"
+        eyes = "stage.viewer.camera.position.toArray().map((part) => part * stage.radius)"
         one, other = each(eyes)
         assert one == pytest.approx(other)
         before = drawn()
@@ -91,7 +89,7 @@ def test_both_move_by_one_clock_and_are_seen_by_one_camera(tmp_path):
         assert all((np.abs(a - b).max(axis=2) > 30).sum() > 500 for a, b in zip(before, after, strict=True))
         # Boxes are for both.
         browser.evaluate("document.querySelector('#layers input').click()")
-        forces = "viewer.scene_tree.find(design.layers[0].paths[0]).object.visible"
+        forces = "stage.viewer.scene_tree.find(stage.layers[0].paths[0]).object.visible"
         assert each(forces) == [False, False]
         assert browser.problems == []
         reached = [address for address in browser.requests if not address.startswith(("data:", "blob:", "about:"))]
