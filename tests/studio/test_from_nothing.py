@@ -39,10 +39,10 @@ def drag_up(page, browser, path, where, pixels):
     blue = (after[..., 2] - after[..., 0] > 40) & (np.abs(after - before).sum(axis=2) > 60)
     blue[:, :440] = blue[:, 1070:] = False
     rows, columns = np.nonzero(blue)
-    tip = float(rows.min() + 8)
+    tip = float(rows.min() + 12)
     x = float(np.median(columns[np.abs(rows - tip) < 4]))
     text = page.session.text
-    browser.drag((x, tip), (x, tip - pixels))
+    browser.drag((x, tip), (x, tip - pixels), steps=30)  # slowly: without a graphics card pages draw slowly
     until(lambda: page.session.text != text)
 
 
