@@ -41,9 +41,9 @@ def drag_up(page, browser, path, where, pixels):
     rows, columns = np.nonzero(blue)
     tip = float(rows.min() + 12)
     x = float(np.median(columns[np.abs(rows - tip) < 4]))
-    text = page.session.text
+    understood = page.session.understood
     browser.drag((x, tip), (x, tip - pixels), steps=30)  # slowly: without a graphics card pages draw slowly
-    until(lambda: page.session.text != text)
+    until(lambda: page.session.understood is not understood)
 
 
 def test_a_task_made_by_hand_and_eye_is_solved_as_its_file_is(tmp_path):

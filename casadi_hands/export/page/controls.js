@@ -70,9 +70,15 @@ function controls(stages) {
   // A fragment such as #t=1.5 opens the page at that time, at rest.
   function jump() {
     const parts = new URLSearchParams(location.hash.slice(1));
-    document.body.classList.toggle("still", parts.has("still"));
+    if (document.body.classList.contains("still") !== parts.has("still")) {
+      document.body.classList.toggle("still");
+      makeRoom();
+    }
     const wanted = parts.get("t") ?? stages[0].start;
     if (wanted !== null && wanted !== "" && Number.isFinite(Number(wanted))) rest(Number(wanted));
+  }
+  function makeRoom() {
+    for (const stage of stages) if (stage.window === window) stage.above(() => bar.offsetHeight);
   }
   const hair = 1e-6 * (end - begin);
   const steps = {
@@ -99,6 +105,7 @@ function controls(stages) {
   for (const stage of stages) {
     if (stage.window !== window) stage.window.addEventListener("keydown", window.onkeydown);
   }
+  makeRoom();
   show();
   jump();
   requestAnimationFrame(step);

@@ -36,7 +36,7 @@ viewer.renderer.setSize(WIDTH, HEIGHT);
 viewer.camera.aspect = WIDTH / HEIGHT;
 viewer.camera.updateProjectionMatrix();
 const stills = TIMES.map((time) => {
-  location.hash = `t=${time}`;
+  location.hash = `still&t=${time}`;
   if (window.onhashchange) window.onhashchange();
   viewer.render();
   return viewer.renderer.domElement.toDataURL("image/FORM", 0.9);

@@ -54,14 +54,14 @@ sky();
 dark.addEventListener("change", sky);
 
 // The scene fits in a ball of radius 1 about the origin: stand where the ball, or one so many times as large, fills the
-// narrower side of the window.
-let seen = design.views[0].eye, share = 1, stood = null;
+// narrower side of the window above what stands at its bottom.
+let seen = design.views[0].eye, share = 1, stood = null, below = () => 0;
 function look(eye) {
   seen = eye;
-  const fieldOfView = 32;
-  const aspect = window.innerWidth / window.innerHeight;
-  const halfAngle = Math.atan(Math.tan(fieldOfView * Math.PI / 360) * Math.min(1, aspect));
+  const fieldOfView = 32, [width, height, taken] = [window.innerWidth, window.innerHeight, below()];
+  const halfAngle = Math.atan(Math.tan(fieldOfView * Math.PI / 360) * Math.min(width, height - taken) / height);
   const [x, y, z] = eye.map((part) => part * share * 1.02 / Math.sin(halfAngle));
+  viewer.camera.setViewOffset(width, height, 0, taken / 2, width, height);
   viewer.camera.fov = fieldOfView;
   viewer.camera.near = 0.05;
   viewer.camera.position.set(x, z, -y);  // meshcat's camera has y up
@@ -77,6 +77,7 @@ stage.look = (name) => {
   const view = stage.views.find((each) => each.name === name);
   if (view) look(view.eye);
 };
+stage.above = (taken) => { below = taken; look(seen); };
 stage.fit = (times) => { share = times; look(seen); };
 stage.turned = (follow) => viewer.controls.addEventListener("change", () => {
   follow(viewer.camera.position.toArray(), viewer.controls.target.toArray(), share);

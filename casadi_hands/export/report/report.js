@@ -167,7 +167,13 @@
 
   // Added to the viewer's page: what this page says already is left out, and pictures are taken.
   const ADDED = `<style>#about h1, #about p, #parts { display: none !important; }</style>
-<script>window.picture = () => { viewer.renderer.render(viewer.scene, viewer.camera); return viewer.renderer.domElement.toDataURL("image/jpeg", 0.85); };<\/script></body>`;
+<script>window.picture = () => {
+  const { camera, renderer, scene } = viewer, view = { ...camera.view };
+  camera.clearViewOffset();  // nothing stands before a picture
+  renderer.render(scene, camera);
+  camera.setViewOffset(view.fullWidth, view.fullHeight, view.offsetX, view.offsetY, view.width, view.height);
+  return renderer.domElement.toDataURL("image/jpeg", 0.85);
+};<\/script></body>`;
   async function open() {
     const packed = Uint8Array.from(atob(document.getElementById("scene").textContent), (c) => c.charCodeAt(0));
     const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));

@@ -98,7 +98,8 @@ def test_a_curve_is_hidden_by_its_name(opened):
     opened.wait(f"{image} !== {before!r}")
 
 
-@pytest.mark.parametrize(("width", "dark"), [(1440, False), (768, True), (390, False), (390, True)])
+@pytest.mark.parametrize("dark", [False, True])
+@pytest.mark.parametrize("width", [1440, 768, 390])
 def test_it_fits_and_can_be_read(opened, width, dark):
     browser = opened
     browser.look(width, 900, dark)
