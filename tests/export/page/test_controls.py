@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 from base64 import b64decode
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -179,7 +180,13 @@ def test_space_plays_and_the_address_lets_go(opened):
     assert opened.evaluate(f"new Promise((done) => setTimeout(() => done({CLOCK}), 300))") == rest
 
 
-def test_speed_is_time_by_the_clock_on_the_wall(opened):
+def test_speed_is_time_by_the_clock_on_the_wall(browser, tmp_path):
+    motion = example_motion()
+    slow = replace(example_design(), motion=replace(motion, time=30 * motion.time))  # a minute: it does not begin anew
+    (tmp_path / "slow.html").write_text(page_text(slow))
+    browser.open((tmp_path / "slow.html").as_uri() + "#t=1", 320, 240)
+    browser.wait(f"{CLOCK} === 1")
+    opened = browser
     # The page's own frames say how fast its time goes by.
     measured = """new Promise((done) => {
       const found = [], scrub = document.getElementById('scrub');
