@@ -113,8 +113,8 @@ def draw_scene(design: Result) -> Scene:
         layers.append(Layer("Joint axes", False, AXIS_COLOR, axes))
     labels: tuple[Label, ...] = ()
     if design.hand is None:
-        contacts = _draw_contacts(root["object"]["contacts"], task, radius)
-        contacts = (*contacts, *draw_candidates(root["object"]["contacts"], design.placement, radius))
+        node = root["object"]["contacts"]
+        contacts = (*_draw_contacts(node, task, radius), *draw_candidates(node, design.placement, radius))
         labels = (*contacts, *goal_labels(root["goals"], task, GOAL_COLOR))
         layers.append(Layer("Contacts", True, None, (steps(root["object"]["contacts"]),)))
     if len(timeline.time) > 1:
