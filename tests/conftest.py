@@ -3,6 +3,8 @@
 import os
 import sys
 import zlib
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,3 +18,12 @@ if sys.platform == "linux" and "DISPLAY" not in os.environ:
 def rng(request: pytest.FixtureRequest) -> np.random.Generator:
     """Random numbers of a test's own: the same in every run, whichever tests ran before it."""
     return np.random.default_rng(zlib.crc32(request.node.nodeid.encode()))
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """A browser without a screen, for tests that are marked to need one."""
+    from tests.export.browser import Browser
+
+    with Browser() as found:
+        yield found

@@ -108,7 +108,7 @@ def test_a_mesh_that_the_task_does_not_tell_of_is_named(scene: Scene, tmp_path: 
     assert "object.urdf shows 1 meshes, task.yaml tells of 0" in audit_files(folder).reasons
 
 
-@pytest.mark.parametrize("faces", [[[0, 1, 6]] * 4, [[-1, 1, 2]] * 4, [[0, 1, 2]]])
+@pytest.mark.parametrize("faces", [[[0, 1, 6]] * 4, [[-1, 1, 2]] * 4, [[0, 1, 2]], [[10**30, 1, 2]] * 4])
 def test_triangles_of_no_vertices_are_told(scene: Scene, tmp_path: Path, faces: list[list[int]]) -> None:
     with pytest.raises(DesignError, match=r"object_raw0\.obj: (not a mesh|a mesh has)"):
         audit_files(_unread(written(scene, tmp_path / "bad", 0.0, faces=faces)))

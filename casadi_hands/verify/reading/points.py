@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 
 import numpy as np
@@ -25,11 +26,27 @@ def read_points(path: Path, name: str) -> np.ndarray:
         DesignError: it is elsewhere, missing, too large, or holds no polytope.
     """
     file = file_within(path, name)
+    (vertices,) = read_rows(file, {"v": float})
+    return hull_points(file, vertices.ravel())
+
+
+def read_rows(file: Path, kinds: Mapping[str, type]) -> list[np.ndarray]:
+    """Return the numbers of an OBJ file's lines of some kinds, an array each.
+
+    Args:
+        file: OBJ.
+        kinds: type of the numbers by the word that such lines begin with.
+
+    Raises:
+        DesignError: they are no numbers, or rows of a kind are not equally long.
+    """
+    lines = [line.split() for line in read_text(file).splitlines()]
     try:
-        lines = [line.split() for line in read_text(file).splitlines()]
-        rows = [[float(word) for word in line[1:]] for line in lines if line and line[0] == "v"]
-        return hull_points(file, np.array(rows, float).ravel())
-    except ValueError as error:
+        return [
+            np.array([[kind(word) for word in line[1:]] for line in lines if line and line[0] == first], kind)
+            for first, kind in kinds.items()
+        ]
+    except (ValueError, OverflowError) as error:
         raise DesignError(f"{file}: not a mesh: {error}") from None
 
 

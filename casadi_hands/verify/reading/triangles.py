@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from casadi_hands.errors import DesignError
-from casadi_hands.problem.stored import LARGEST_NUMBER, read_text
+from casadi_hands.problem.stored import LARGEST_NUMBER
 from casadi_hands.verify.raw_mesh import RawMesh
-from casadi_hands.verify.reading.points import file_within
+from casadi_hands.verify.reading.points import file_within, read_rows
 
 MOST_VERTICES, MOST_FACES = 60_000, 60_000
 
@@ -25,12 +25,8 @@ def read_raw_mesh(path: Path, name: str) -> RawMesh:
         DesignError: it is elsewhere, missing, too large, or holds no triangles.
     """
     file = file_within(path, name)
-    try:
-        lines = [line.split() for line in read_text(file).splitlines()]
-        vertices = np.array([[float(word) for word in line[1:]] for line in lines if line and line[0] == "v"], float)
-        faces = np.array([[int(word) for word in line[1:]] for line in lines if line and line[0] == "f"], int) - 1
-    except ValueError as error:
-        raise DesignError(f"{file}: not a mesh: {error}") from None
+    vertices, numbers = read_rows(file, {"v": float, "f": int})
+    faces = numbers - 1
     sized = vertices.ndim == 2 and faces.ndim == 2 and vertices.shape[1] == faces.shape[1] == 3
     if not sized or not (4 <= len(vertices) <= MOST_VERTICES and 4 <= len(faces) <= MOST_FACES):
         raise DesignError(f"{file}: a mesh has 4 to {MOST_FACES} triangles of up to {MOST_VERTICES} vertices")

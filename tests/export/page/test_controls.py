@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from casadi_hands.export.page.page import page_text
-from tests.export.browser import Browser, needs_browser
+from tests.export.browser import needs_browser
 from tests.export.example import example_design, example_motion
 from tests.export.report.test_in_a_browser import contrast
 
@@ -21,12 +21,6 @@ COLORS = {"Forces": (217, 31, 38), "Goals": (64, 153, 89), "Joint axes": (250, 1
 # What the browser draws now, as PNG.
 DRAWN = "(viewer.render(), viewer.renderer.domElement.toDataURL())"
 CLOCK = "parseFloat(document.getElementById('clock').textContent)"
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with Browser() as found:
-        yield found
 
 
 @pytest.fixture(scope="module")

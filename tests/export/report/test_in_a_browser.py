@@ -17,12 +17,6 @@ INNER = "document.getElementById('viewer').contentDocument"
 
 
 @pytest.fixture(scope="module")
-def browser():
-    with Browser() as found:
-        yield found
-
-
-@pytest.fixture(scope="module")
 def report(tmp_path_factory):
     path = tmp_path_factory.mktemp("report") / "report.html"
     write_report(example_design(), path)
