@@ -61,7 +61,7 @@ function controls(stages) {
   function step(now) {
     if (playing) {
       if (last !== null) time += (now - last) / 1000 * Number(speed.value);
-      if (time > end) time = begin;
+      if (time > end) time = begin + (time - begin) % (end - begin);
       show();
     }
     last = now;

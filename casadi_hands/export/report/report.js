@@ -33,7 +33,7 @@
       playing = now !== before;
     } else if (playing) {
       now += last === null ? 0 : (stamp - last) / 1000;
-      if (now > end) now = begin;
+      if (now > end) now = begin + (now - begin) % (end - begin);
     }
     last = stamp;
     if (now !== before || playing) show();
