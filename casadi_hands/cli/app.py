@@ -144,7 +144,7 @@ def formulate(
 
 app.command(epilog="Example: `casadi-hands check task.yaml --show task.html`")(check)
 app.command(epilog="Example: `casadi-hands studio task.yaml`")(studio)
-app.command(epilog="Example: `casadi-hands view results/task`, or `… view results/task --gif task.gif`")(view)
+app.command(epilog="Example: `casadi-hands view results/task --gif task.gif`")(view)
 
 
 @app.command(epilog="Example: `casadi-hands report results/task`")

@@ -425,7 +425,7 @@ def test_replay_prints_errors_and_drops(monkeypatch: pytest.MonkeyPatch) -> None
         goals = (GoalError(1e-3 * millimetres, 0.5),) * 3
         return Replay(*errors, dropped, ("thumb",) if dropped else (), Perturbation(), goals)
 
-    many = [outcome(1.0), outcome(2.0), outcome(900.0, dropped=True), *[outcome(1.0)] * 7]
+    many = [outcome(1.0), outcome(2.0), outcome(900.0, dropped=True), *[outcome(1.0)] * 17]
     asked: list[tuple[Any, ...]] = []
 
     def run_replays(*arguments: Any) -> Replays:
@@ -435,19 +435,19 @@ def test_replay_prints_errors_and_drops(monkeypatch: pytest.MonkeyPatch) -> None
 
     nominal = outcome(0.5)
     monkeypatch.setattr(casadi_hands.verify, "run_replays", run_replays)
-    found = run("replay", "folder", "--perturb", 10, "--seed", 7, "--jobs", 2)
+    found = run("replay", "folder", "--perturb", 20, "--seed", 7, "--jobs", 2)
     rows = [" ".join(line.split()) for line in found.output.splitlines()]
-    assert asked == [(Path("folder"), 10, 7, 2, "mujoco")]
+    assert asked == [(Path("folder"), 20, 7, 2, "mujoco")]
     assert "as planned 0.5 1 1.5 0.5 0.75 0.25" in rows
-    assert "9 perturbed, mean 1.11 2.22 3.33 0.5 0.75 0.25" in rows
-    assert "9 perturbed, worst 2 4 6 0.5 0.75 0.25" in rows
+    assert "19 perturbed, mean 1.05 2.11 3.16 0.5 0.75 0.25" in rows
+    assert "19 perturbed, worst 2 4 6 0.5 0.75 0.25" in rows
     assert "from goal 3: 0.5 mm, 0.5 deg" in rows
-    assert "perturbed: dropped in 1 of 10" in rows
+    assert "perturbed: dropped in 1 of 20" in rows
     assert found.exit_code == 0
-    # One in three is more than a tenth; an object that is far from a goal is, too, and one that is dropped.
+    # One in three is more than one in twenty; an object that is far from a goal is, too, and one that is dropped.
     found = run("replay", "folder", "--perturb", 3)
     assert found.exit_code == 1
-    assert "1 of 3 perturbed replays drop the object (number 2), 33.3 %; limit 10 %" in " ".join(found.output.split())
+    assert "1 of 3 perturbed replays drop the object (number 2), 33.3 %; limit 5 %" in " ".join(found.output.split())
     nominal = outcome(4.0)
     found = run("replay", "folder")
     assert found.exit_code == 1

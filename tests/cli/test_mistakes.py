@@ -47,7 +47,7 @@ MISTAKES = {
         [("0.3]", "2.4]"), ("fingers:", "hand: {link_length: [0.02, 0.2]}\nfingers:")],
         1,
         "it is 2188 mm from the palm's centre, and a finger of 3 links of at most 200 mm each, on the palm's rim, "
-        "reaches 629.8 mm",
+        "reaches 637.4 mm",
     ),
     "far away with links to match": (
         [("0.3]", "2.4]")],

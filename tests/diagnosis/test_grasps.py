@@ -46,7 +46,7 @@ def test_what_holds_at_goal_1_may_not_at_goal_2() -> None:
 def test_contacts_on_one_side() -> None:
     text, certain = told(seen(touches=ring(0, 0, turn=45)))
     assert certain
-    assert "a force of 0.88 weights and a torque of 2.33 mN·m are missing" in text
+    assert "a force of 0.88 weights and a torque of 2.32 mN·m are missing" in text
 
 
 def test_the_ground_helps_where_the_object_lies_on_it() -> None:

@@ -7,6 +7,7 @@ import pytest
 from tests.diagnosis.balls import PALM, seen, told
 
 AT = "position: [0, 0, 0.2]"
+RADIUS = 0.003432  # of links, m
 
 
 @pytest.mark.parametrize(
@@ -50,16 +51,16 @@ def test_an_object_beside_the_palm() -> None:
 
 @pytest.mark.parametrize(("short", "reaches"), [(0.001, True), (-0.001, False)])
 def test_out_of_reach_at_one_goal_only(short: float, reaches: bool) -> None:
-    # The palm's radius, three links of 0.1 and a tip of 0.13 palm radii reach 0.329832; the ball's top is 0.022 up.
+    # The palm's radius, three links of 0.1 and the tip's radius reach 0.329832; the ball's top is 0.022 up.
     far = f"position: [0, 0, {0.3 - 0.329832 - 0.022 + short}]"
-    found = seen(goals=[AT, far, AT], more="hand: {link_length: [0.02, 0.1]}")
+    found = seen(goals=[AT, far, AT], more=f"hand: {{link_radius: {RADIUS}, link_length: [0.02, 0.1]}}")
     assert [each.certain for each in found] == ([] if reaches else [True])
     assert all("out of reach at goal 2 (3 s): it is 330.8 mm from" in each.reason.what for each in found)
 
 
 def test_a_palm_that_leaves_its_object() -> None:
     leaves = f"{PALM}, motion: [{{at: 3, position: [0, 0, 1.3]}}]"
-    text, certain = told(seen(leaves, [AT, AT], more="hand: {link_length: [0.02, 0.1]}"))
+    text, certain = told(seen(leaves, [AT, AT], more=f"hand: {{link_radius: {RADIUS}, link_length: [0.02, 0.1]}}"))
     assert certain
     assert text.startswith("the object is out of reach at goal 2 (3 s): it is 1078 mm from the palm's centre")
     assert "reaches 329.8 mm" in text
