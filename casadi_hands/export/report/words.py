@@ -31,6 +31,8 @@ _FIGURES = {
     "slip": "Slip of a contact, from touch to lift",
     "spin": "Turn of a fingertip about its contact",
     "penetration": "Overlap of two bodies",
+    "gap_mesh": "Gap between finger and the mesh itself",
+    "penetration_mesh": "Overlap of a finger and the mesh itself",
     "joint_limit": "Angle beyond a joint's limit",
     "speed": "Speed of joints or motors",
     "torque": "Torque of joints or motors",
