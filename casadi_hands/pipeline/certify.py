@@ -117,11 +117,16 @@ class Certifier:
 
 def refinable(record: Record, model: Model, floating: Floating) -> tuple[Model, Floating, float]:
     """What refinements begin with: the task, or a share of its way that fingers can surely go with the object."""
-    homotopy = _within_reach(model) if model.limits_travel else 1.0
-    if homotopy == 1:
-        return model, floating, homotopy
+    if not rolls_far(model):
+        return model, floating, 1.0
+    homotopy = _within_reach(model)
     shorter = shortened(model, homotopy)
     return shorter, run_shortened(record, shorter, floating), homotopy
+
+
+def rolls_far(model: Model) -> bool:
+    """Whether the object turns by more than fingers can surely go with."""
+    return model.limits_travel and _within_reach(model) < 1
 
 
 def _within_reach(model: Model) -> float:

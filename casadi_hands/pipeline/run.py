@@ -19,7 +19,7 @@ from casadi_hands.export.design import Design
 from casadi_hands.export.place import owned
 from casadi_hands.export.record import STATUSES
 from casadi_hands.nlp import SolverError
-from casadi_hands.pipeline.certify import Certifier
+from casadi_hands.pipeline.certify import Certifier, rolls_far
 from casadi_hands.pipeline.couplings import Coupler
 from casadi_hands.pipeline.judge import Judge, counted
 from casadi_hands.pipeline.placing import ATTEMPTS, place, placed_like, stood_like, tell_palm, unplaceable
@@ -36,6 +36,7 @@ from casadi_hands.problem.model import Model
 from casadi_hands.problem.si import build_model
 from casadi_hands.stages.own_terms import try_out
 from casadi_hands.stages.refine.values import Margin
+from casadi_hands.stages.synthesis.algorithm import Found
 from casadi_hands.task import Task
 from casadi_hands.terms.own import OwnTerm, checked
 from casadi_hands.verify.replays.engine import load_mujoco
@@ -234,20 +235,31 @@ def _run(record: Record, until: str, executor: Executor | None, jobs: int) -> De
     model = floating.model
     if until == "floating":
         return _stopped(record, until)
-    search = prepare_search(record, model, floating, executor)
-    found = run_search(record, model, search)
+    # Over a long way bends lead astray: straight links are tried first there, which have fewer ways to fold.
+    first, *others = (replace(model, bend=0.0), model) if model.bend and rolls_far(model) else (model,)
+    search = prepare_search(record, first, floating, executor)
+    found = run_search(record, first, search)
     if until == "synthesis":
         return _stopped(record, until)
     judge = Judge(model, floating, record.scratch)
     if until == "whole_hand":
-        run_whole_hand(record, model, floating, found.candidates[0])
+        run_whole_hand(record, first, floating, found.candidates[0])
         design = judge.judge(record.design, [shortcoming_reason(model, short) for short in found.short])
         judged = record.held_to_bounds(design)
         return judge.replayed(judged, jobs) if judged.status == "certified" else judged
-    certifier = Certifier(record, model, floating, search, judge, jobs)
-    design = Pruner(record, search, lambda candidate: certifier.certify(candidate)[0]).run(certifier.run(found))
-    design = judge.concluded(design, jobs)
-    return Coupler(record, model, judge, jobs).run(design)
+    design = _certified(Certifier(record, first, floating, search, judge, jobs), found)
+    for links in others:
+        if design.status != "certified":
+            search = prepare_search(record, links, floating, executor)
+            found = run_search(record, links, search)
+            design = _certified(Certifier(record, links, floating, search, judge, jobs), found)
+    return Coupler(record, model, judge, jobs).run(judge.concluded(design, jobs))
+
+
+def _certified(certifier: Certifier, found: Found) -> Design:
+    """The best design of the hands of a search, with as few joints as move."""
+    pruner = Pruner(certifier.record, certifier.search, lambda candidate: certifier.certify(candidate)[0])
+    return pruner.run(certifier.run(found))
 
 
 def _stopped(record: Record, stage: str) -> Design:

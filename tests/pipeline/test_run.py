@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -237,3 +238,28 @@ def test_only_what_ipopt_itself_raises_is_a_solvers_failure(monkeypatch: pytest.
     with pytest.raises(RuntimeError, match="linear solver not found") as raised:
         solve(ball_task(), jobs=1, until="floating")
     assert type(raised.value) is RuntimeError
+
+
+@pytest.mark.parametrize(
+    ("far", "straight", "bends"),
+    [(False, "certified", [90]), (True, "certified", [0]), (True, "feasible", [0, 90]), (False, "feasible", [90])],
+)
+def test_straight_links_are_tried_first_where_fingers_must_roll_far(
+    far: bool, straight: str, bends: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tried, task = list[float](), ball_task()
+    monkeypatch.setattr(run, "rolls_far", lambda _: far)
+    monkeypatch.setattr(run, "run_floating", lambda _, model: SimpleNamespace(model=model))
+    monkeypatch.setattr(run, "prepare_search", lambda _, model, *__: SimpleNamespace(model=model))
+    monkeypatch.setattr(run, "run_search", lambda *_: None)
+
+    def certified(certifier: Any, found: Any) -> Design:
+        tried.append(round(np.degrees(certifier.model.bend)))
+        status: Any = straight if len(tried) == 1 else "certified"
+        return Design(task, status)
+
+    monkeypatch.setattr(run, "_certified", certified)
+    monkeypatch.setattr(run, "Judge", lambda *_: SimpleNamespace(concluded=lambda design, _: design))
+    design = run._run(Record(task, None, lambda _: None), "refine", None, 1)
+    assert tried == bends
+    assert design.status == ("certified" if len(bends) == 2 else straight)
