@@ -44,13 +44,13 @@ def view(
 
     if png is not None or gif is not None:
         if other is not None:
-            raise HandsError("--png and --gif draw one design, and two folders are given; draw one after the other")
+            raise HandsError("--png and --gif draw one design, and two folders are given; give one, then the other")
         _draw(folder, png, at, gif)
         return
     if at is not None:
-        raise HandsError("--at is for --png; a page is opened at a time by its address: viewer.html#t=1.5")
+        raise HandsError("--at is for --png; open a page at a time by its address: viewer.html#t=1.5")
     if out is not None and other is None:
-        raise HandsError("--out is for the page of two folders; the page of one is viewer.html in it")
+        raise HandsError("--out is for the page of two folders; leave it out for that of one, viewer.html in it")
     from casadi_hands.export.page.own_page import open_page, open_pair
 
     print(open_page(folder) if other is None else open_pair(folder, other, out))

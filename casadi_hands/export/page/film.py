@@ -70,7 +70,7 @@ def pictures(design: Result, times: list[float], size: tuple[int, int], form: st
         drawn = re.search(r"<pre>(.*?)</pre>", content(page), re.DOTALL)
     found = [b64decode(each.partition("base64,")[2]) for each in json.loads(drawn[1])] if drawn else []
     if len(found) != len(times) or not all(picture.startswith(_BEGINNINGS[form]) for picture in found):
-        raise HandsError("the browser drew no pictures of the page: does it have WebGL (chrome://gpu)?")
+        raise HandsError("the browser drew no pictures of the page; try one with WebGL, which chrome://gpu tells of")
     return found
 
 
@@ -134,4 +134,4 @@ def _write(file: Path, data: bytes) -> None:
     try:
         file.write_bytes(data)
     except OSError as error:
-        raise HandsError(f"{file}: cannot be written: {error.strerror}; name a file in another folder") from None
+        raise HandsError(f"{file}: cannot be written: {error.strerror}; give a file in another folder") from None
