@@ -63,7 +63,9 @@ def _run(address: str, *wanted: str) -> bytes:
         try:
             done = subprocess.run(command, capture_output=True, timeout=_SECONDS, check=False)
         except subprocess.TimeoutExpired:
-            raise HandsError(f"{program} did not draw {address} within {_SECONDS} s; try again when the machine is less busy") from None
+            raise HandsError(
+                f"{program} did not draw {address} within {_SECONDS} s; try again when the machine is less busy"
+            ) from None
     if done.returncode:
         last = done.stderr.decode("utf-8", "replace").strip().splitlines()[-1:]
         raise HandsError(f"{program} ended with {done.returncode}: {' '.join(last)}; try another browser in PATH")
