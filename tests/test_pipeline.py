@@ -168,7 +168,7 @@ def test_a_contact_out_of_reach_at_the_start_fails_the_task_at_once() -> None:
 def test_a_contact_out_of_reach_fails_the_task(tmp_path: Path) -> None:
     # A second goal 19 cm from the palm for fingers of 10 cm.
     link, names = 0.05, ("goal 2 (0.6 s)",)
-    text = changed("hand: {link_length: [0.016, 0.05]}", "[0, 0.015, 0.09] -> [0, 0.17, 0.09]")
+    text = changed("hand: {link_radius: 0.0078, link_length: [0.016, 0.05]}", "[0, 0.015, 0.09] -> [0, 0.17, 0.09]")
     (tmp_path / "task.yaml").write_text(text)
     result = CliRunner().invoke(
         app, ["solve", str(tmp_path / "task.yaml"), "--out", str(tmp_path / "out"), "--jobs", "1"]
