@@ -20,7 +20,10 @@ def pair_text(one: Result, other: Result, names: tuple[str, str]) -> str:
         other: likewise.
         names: what tells them apart, of their folders, say.
     """
-    titles = [f"{design.task.name} ({name})" for design, name in zip((one, other), names, strict=True)]
+    titles = [
+        name if name == design.task.name else f"{design.task.name} ({name})"
+        for design, name in zip((one, other), names, strict=True)
+    ]
     scenes = [packed(page_text(design, within=title)) for design, title in zip((one, other), titles, strict=True)]
     parts = {
         "title": escape(" and ".join(titles)),
