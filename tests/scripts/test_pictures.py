@@ -6,7 +6,7 @@ import pytest
 from pictures import main, tiled
 from PIL import Image
 
-from casadi_hands.export.browser import MISSING, browser
+from tests.export.browser import needs_browser
 from tests.export.example import example_design
 
 COLORS = ((255, 0, 0), (0, 255, 0), (0, 0, 255))
@@ -18,9 +18,8 @@ def test_tiles_stand_row_by_row() -> None:
     assert [whole.getpixel(place) for place in ((10, 5), (30, 5), (10, 15), (30, 15))] == [*COLORS, (255, 255, 255)]
 
 
+@needs_browser
 def test_a_page_is_drawn_at_its_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    if browser() is None:
-        pytest.skip(MISSING)
     example_design().save(tmp_path / "design")
     file, folder = str(tmp_path / "both.png"), str(tmp_path / "design")
     monkeypatch.setattr("sys.argv", ["pictures.py", file, folder, folder, "--at", "0", "1", "--size", "500", "400"])

@@ -11,12 +11,12 @@ from PIL import Image
 from stills import SIZE, stills
 
 from casadi_hands.errors import HandsError
-from casadi_hands.export.browser import MISSING, browser
 from casadi_hands.export.design import Design
 from casadi_hands.export.page.scene import eye_towards
+from tests.export.browser import needs_browser
 from tests.export.example import example_hand, example_motion, example_task
 
-pytestmark = pytest.mark.skipif(browser() is None, reason=MISSING)
+pytestmark = needs_browser
 
 
 def yellow_middle(picture: bytes) -> np.ndarray:

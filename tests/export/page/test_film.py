@@ -12,11 +12,9 @@ from typer.testing import CliRunner
 
 from casadi_hands.cli.app import app
 from casadi_hands.errors import HandsError
-from casadi_hands.export.browser import MISSING, browser
 from casadi_hands.export.page.film import FRAME, GIF_SIZE, PICTURE_SIZE, write_gif, write_png
+from tests.export.browser import needs_browser
 from tests.export.example import example_design, example_motion
-
-needs_browser = pytest.mark.skipif(browser() is None, reason=MISSING)
 
 
 def yellow_middle(picture):
