@@ -69,7 +69,7 @@ def page_text(
     """
     scene = draw_scene(design)
     parts = {
-        "title": escape(design.task.name),
+        "head": head(design.task.name),
         "heading": escape(within or design.task.name),
         "kind": "" if within is None else ' class="bare"',
         "summary": escape(_summary(design, scene)),
@@ -81,12 +81,16 @@ def page_text(
         "design": _data(scene, time),
         "notice": notice(),
         "meshcat": files("meshcat").joinpath("viewer/dist/main.min.js").read_text(encoding="utf-8"),
-        "style": resource("page.css"),
         "controls": "" if within else resource("controls.html"),
         "stage": resource("stage.js"),
         "script": "" if within else f"<script>{resource('controls.js')}{_START}</script>\n",
     }
     return filled("page.html", parts)
+
+
+def head(title: str) -> str:
+    """The head of a page: nothing is fetched, whoever wrote what is in it."""
+    return filled("head.html", {"title": escape(title), "style": resource("page.css")})
 
 
 def resource(name: str) -> str:

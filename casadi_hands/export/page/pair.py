@@ -6,7 +6,7 @@ import json
 from html import escape
 from typing import TYPE_CHECKING
 
-from casadi_hands.export.page.page import filled, packed, page_text, resource
+from casadi_hands.export.page.page import filled, head, packed, page_text, resource
 
 if TYPE_CHECKING:
     from casadi_hands.problem.result import Result
@@ -26,8 +26,7 @@ def pair_text(one: Result, other: Result, names: tuple[str, str]) -> str:
     ]
     scenes = [packed(page_text(design, within=title)) for design, title in zip((one, other), titles, strict=True)]
     parts = {
-        "title": escape(" and ".join(titles)),
-        "style": resource("page.css"),
+        "head": head(" and ".join(titles)),
         "frames": "".join(f'<iframe title="{escape(title)}"></iframe>' for title in titles),
         "controls": resource("controls.html"),
         "scenes": json.dumps(scenes),
