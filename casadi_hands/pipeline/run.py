@@ -247,13 +247,15 @@ def _run(record: Record, until: str, executor: Executor | None, jobs: int) -> De
         design = judge.judge(record.design, [shortcoming_reason(model, short) for short in found.short])
         judged = record.held_to_bounds(design)
         return judge.replayed(judged, jobs) if judged.status == "certified" else judged
-    design = _certified(Certifier(record, first, floating, search, judge, jobs), found)
+    certifier = Certifier(record, first, floating, search, judge, jobs)
+    design = _certified(certifier, found)
     for links in others:
         if design.status != "certified":
             search = prepare_search(record, links, floating, executor)
             found = run_search(record, links, search)
-            design = _certified(Certifier(record, links, floating, search, judge, jobs), found)
-    return Coupler(record, model, judge, jobs).run(judge.concluded(design, jobs))
+            certifier = Certifier(record, links, floating, search, judge, jobs)
+            design = _certified(certifier, found)
+    return Coupler(record, model, judge, jobs, certifier).run(judge.concluded(design, jobs))
 
 
 def _certified(certifier: Certifier, found: Found) -> Design:

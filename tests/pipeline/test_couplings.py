@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -37,16 +38,45 @@ def with_motors(design: Design, motors: int) -> Design:
     return replace(design, hand=replace(design.hand, drive=drive))
 
 
+class Whole:
+    """A hand that a coupling is looked for."""
+
+    def __init__(self, joints: list[int]) -> None:
+        self.fingers = [SimpleNamespace(joints=n) for n in joints]
+
+
 class Start:
     """What a coupling begins with."""
 
-    def __init__(self, motors: int) -> None:
-        self.motors = motors
+    def __init__(self, whole: Whole, motors: int) -> None:
+        self.motors, self.joints = motors, sum(finger.joints for finger in whole.fingers)
         self.coupling = Coupling(np.ones((6, motors)), np.zeros(6), np.zeros((2, motors)), tuple(range(motors)))
 
 
-def looked_for(monkeypatch: pytest.MonkeyPatch, asked: Any, works: int, joints: int = 6) -> tuple[Design, list[int]]:
-    """The design that is handed over, and the numbers of motors tried, where so many and more work."""
+class Search:
+    """Of hands with other joints."""
+
+    contacts = (0, 1, 2)
+
+    def with_joints(self, joints: dict[int, int]) -> list[Whole]:
+        return [Whole(list(joints.values()))]
+
+    def take_runs(self) -> list[Any]:
+        return []
+
+
+def looked_for(
+    monkeypatch: pytest.MonkeyPatch, asked: Any, works: int, joints: int = 6, larger: int | None = None
+) -> tuple[Design, list[int]]:
+    """The design that is handed over, and the numbers of motors tried, where so many and more work.
+
+    Args:
+        monkeypatch: for what solves.
+        asked: motors.
+        works: motors that work for the hand.
+        joints: of the hand.
+        larger: motors that work for a hand of more joints; None where there is none. Its tries count from ten.
+    """
     design, tried = own_motors(asked), list[int]()
     assert design.hand is not None
     left, fingers = joints, list[Finger]()
@@ -61,19 +91,25 @@ def looked_for(monkeypatch: pytest.MonkeyPatch, asked: Any, works: int, joints: 
         def __init__(self, record: Record, model: Any, judge: Judge, jobs: int) -> None:
             self.motors = model.motors
 
-        def certify(self, begun: Start, *_: Any, **__: Any) -> tuple[Design, None]:
-            tried.append(self.motors)
+        def certify(self, begun: Start, *_: Any, near: bool, **__: Any) -> tuple[Design, None]:
+            assert near == (begun.joints == joints)
+            tried.append(self.motors + (0 if near else 10))
             found = with_motors(design, self.motors)
-            return (found if self.motors >= works else replace(found, status="failed", reason="it slips")), None
+            enough = self.motors >= (works if near else larger or 0)
+            return (found if enough else replace(found, status="failed", reason="it slips")), None
 
     monkeypatch.setattr(couplings, "Refiner", Refiner)
-    monkeypatch.setattr(couplings, "warm_start", lambda *_: None)
+    monkeypatch.setattr(couplings, "warm_start", lambda *_: Whole([len(f.links) for f in design.hand.fingers]))  # type: ignore[union-attr]
     monkeypatch.setattr(couplings, "kept_margin", lambda *_: None)
-    monkeypatch.setattr(couplings, "coupled", lambda model, whole, motors: Start(motors))
+    monkeypatch.setattr(couplings, "coupled", lambda model, whole, motors: Start(whole, motors))
     monkeypatch.setattr(couplings, "joint_commands", lambda model, begun: np.full((2, 6), OFF[begun.motors]))
     model: Any = type("Model", (), {"motors": 0})()
     monkeypatch.setattr(couplings, "replace", _replaced)
-    coupler = Coupler(Record(design.task, None, lambda _: None), model, Judge(model, model), 1)
+    monkeypatch.setattr(couplings, "adopt", lambda *_: None)
+    monkeypatch.setattr(couplings, "rolls_far", lambda _: False)
+    monkeypatch.setattr(couplings, "run_whole_hand", lambda record, model, floating, candidate: candidate)
+    certifier: Any = SimpleNamespace(search=Search(), floating=None) if larger else None
+    coupler = Coupler(Record(design.task, None, lambda _: None), model, Judge(model, model), 1, certifier)
     return coupler.run(design), tried
 
 
@@ -87,6 +123,26 @@ def test_the_fewest_that_are_certified_are_taken_from_where_lines_are_near(monke
     assert tried == [2, 3]
     assert found.hand is not None
     assert (found.status, found.hand.motors, found.reason) == ("certified", 3, "")
+
+
+def test_hands_of_more_joints_are_tried_before_another_motor(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, tried = looked_for(monkeypatch, "fewest", works=3, larger=2)
+    assert tried == [11, 2, 12]
+    assert found.hand is not None
+    assert (found.status, found.hand.motors) == ("certified", 2)
+    assert looked_for(monkeypatch, "fewest", works=3, larger=9)[1] == [11, 2, 12, 3]
+    assert looked_for(monkeypatch, 2, works=2, larger=1)[1] == [2]
+    assert looked_for(monkeypatch, 1, works=2, larger=1)[1] == [11]
+
+
+@pytest.mark.parametrize(
+    ("joints", "most", "due"),
+    [([2, 2, 2], 3, (3, 3, 3)), ([2, 4, 3], 6, (3, 4, 3)), ([2, 1, 2], 2, (2, 2, 2)), ([3, 3], 3, ()), ([2, 2], 2, ())],
+)
+def test_fingers_get_the_joints_to_push_in_all_directions_that_they_may_have(
+    joints: list[int], most: int, due: tuple[int, ...]
+) -> None:
+    assert couplings._with_enough(joints, most) == due
 
 
 def test_of_a_number_only_that_is_tried_and_out_of_reach_it_is_not_certified(monkeypatch: pytest.MonkeyPatch) -> None:

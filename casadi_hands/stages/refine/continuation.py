@@ -24,6 +24,7 @@ from casadi_hands.problem.structure import mobility
 from casadi_hands.stages.refine.result import Refined, Run
 from casadi_hands.stages.refine.settings import (
     ALL_STEPS,
+    COUPLING_FROM_AFAR,
     COUPLING_STEPS,
     LAST_STEP,
     NEARBY_STEPS,
@@ -93,7 +94,7 @@ class Continuation:
                 ways are tried first.
         """
         if self.model.motors:
-            return self._on_few(COUPLING_STEPS, start, margin)
+            return self._on_few(COUPLING_STEPS if near else COUPLING_FROM_AFAR, start, margin)
         sequences: list[tuple[Step, ...]] = [ALL_STEPS]
         if near:
             sequences.insert(0, NEARBY_STEPS)

@@ -26,7 +26,7 @@ from casadi_hands.terms import finger
 
 Array = NDArray[np.float64]
 # rad that commands may be off their lines: with penalties, and at last.
-OFF_LINES = {"stiff penalty": 0.05, "hard constraints": 1e-5}
+OFF_LINES = {"penalty": 0.3, "stiff penalty": 0.05, "hard constraints": 1e-5}
 
 
 def _lines(kernel: Kernel, joints: int, motors: int) -> SX:

@@ -55,6 +55,8 @@ COUPLING_STEPS: tuple[Step, ...] = (
     ALL_STEPS[1],
     ("hard constraints", WEIGHTS | HARD, replace(HARD_CONSTRAINTS, max_iter=80)),
 )
+# To such a one from a motion that is not exact.
+COUPLING_FROM_AFAR: tuple[Step, ...] = (ALL_STEPS[0], *COUPLING_STEPS)
 LAST_STEP: tuple[Step, ...] = NEARBY_STEPS[-1:]
 # Of the slip with which friction is on its cone: with penalties, and of hard constraints one after another from there.
 VISCOUS = 100.0
