@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -34,6 +35,7 @@ FINEST = 0.02  # s between samples
 ENOUGH = 0.7  # of a limit: intervals that contribute more are halved
 LEFT = 1 / 8  # of what an interval slips, once it is halved; a cubic spline's error falls to a sixteenth
 HARDLY = 0.3  # of the joints' stiffness: a grasp that asks for more is lost where joints are a little softer
+STRAINED = 0.8  # of the motors' torque: a plan that asks for more leaves them little for what it does not know
 GAIN = 0.8  # of how far limits are missed, that more samples must reach to be worth still more
 
 
@@ -62,7 +64,7 @@ class Refiner:
 
         A small one where no motion is exact, and another lower bound on normal forces where the audit refuses one that
         is. Where replays drop the object or end off its goals, a firmer grip or, where the joints are hardly stiff
-        enough, a softer one.
+        enough or motors hardly strong enough, a softer one.
 
         Args:
             whole: the hand and its motion.
@@ -76,8 +78,7 @@ class Refiner:
         """
         planned, margins = self.record.design, margins_for(self.model, whole)
         margin, largest = margin or margins.ample, margins.larger
-        stage = Continuation(self.model, whole.contacts, tuple(f.joints for f in whole.fingers), whole.active)
-        refined = self._refined(stage, whole, margin, near, homotopy, largest)
+        refined, stage = self._exact(whole, margin, near, homotopy, largest)
         judged, refined, stage = self._between(whole, refined, stage, short, planned)
         if refined.exact and judged.status != "certified" and not stage.passes_through(refined):
             # Where joints barely push, fingers may fold over in an instant: other forces take them another way.
@@ -95,7 +96,7 @@ class Refiner:
             if rank_of(design) < rank_of(judged):
                 judged, refined = design, sharp
         another, which = largest, "firmer"
-        if judged.least_stiffness > HARDLY * self.record.task.actuator.stiffness:
+        if judged.least_stiffness > HARDLY * self.record.task.actuator.stiffness or judged.share_of_torque > STRAINED:
             another, which = margins.softer, "softer"
         if refined.margin != another and (judged.drops or judged.replay_angle > AIM):
             other = self._with_margin(
@@ -105,6 +106,21 @@ class Refiner:
             if rank_of(design) < rank_of(judged):
                 return design, other
         return judged, refined
+
+    def _exact(
+        self, whole: WholeHand, margin: Margin, near: bool, homotopy: float, larger: Margin
+    ) -> tuple[Refined, Continuation]:
+        """The refinement and what it was found with; contacts that may slide do so where none is exact that roll."""
+        joints = tuple(finger.joints for finger in whole.fingers)
+        for sliding in sorted({0.0, self.model.sliding}):
+            model = replace(self.model, sliding=sliding)
+            stage = Continuation(model, whole.contacts, joints, whole.active)
+            if sliding:
+                self.record.log("refine", "with contacts that slide, as no motion was exact with which all roll")
+            refined = self._refined(stage, whole, margin, near, homotopy, larger)
+            if refined.exact:
+                break
+        return refined, stage
 
     def _between(
         self, whole: WholeHand, refined: Refined, stage: Continuation, short: tuple[Reason, ...], planned: Design
@@ -158,6 +174,8 @@ class Refiner:
         with self.record.stage("refine", "the same motion with exact physics, rolling contacts and clearance"):
             refined = self._attempt(whole, margin, first)
         if refined.exact or refined.barely_rolls or margin == SMALL or self.model.motors:
+            return refined
+        if stage.model.sliding != self.model.sliding:
             return refined
         with self.record.stage("refine", "again, closer to the limits of friction and normal forces"):
             second = self._attempt(whole, SMALL, again)

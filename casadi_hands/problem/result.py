@@ -68,6 +68,12 @@ class Result:
         return float(self.certificate.get("least_stiffness", {}).get("value") or 0.0)
 
     @property
+    def share_of_torque(self) -> float:
+        """Of what the task's motors give, that the plan asks for at most; 0 where the task names no motors' torque."""
+        figure = self.certificate.get("torque", {})
+        return float(figure.get("value") or 0.0) if figure.get("unit") == "share" else 0.0
+
+    @property
     def replay_angle(self) -> float:
         """Degrees by which the object is off a goal at most in the replay as planned; 0 where there was none."""
         return float(self.certificate.get("replay_angle", {}).get("value") or 0.0)

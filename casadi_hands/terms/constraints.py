@@ -147,7 +147,7 @@ WITHIN_SLIP = Constraint(
     "path",
     "section 3.3.3: how far the contact slides from touch to lift",
     "length",
-    "slide no farther than accepted",
+    "keep its slide within limits.slip",
     f"{_JOINTS}, or limits.slip as wide as you can accept",
     ("slip",),
 )

@@ -294,16 +294,20 @@ def refine(
     stiffness: float = 0.1,
     angle: float = 1.0,
     soft: bool = False,
+    torque: float | None = None,
 ) -> tuple[Margin, int]:
     """The margin of what is kept and its drops, where designs and drops are judged as told, in this order.
 
-    Of each the grasp asks for a stiffness, N·m/rad, and the replay as planned ends at an angle, degrees, off a goal.
+    Of each the grasp asks for a stiffness, N·m/rad, and a share of the motors' torque, if they have one, and the replay
+    as planned ends at an angle, degrees, off a goal.
     """
     judged, dropped = iter(statuses), iter(drops)
     monkeypatch.setattr(refiner_module, "margins_for", lambda *_: Margins(AMPLE, LARGE, SOFT))
     monkeypatch.setattr(refiner_module, "Continuation", lambda *_: ways)
     monkeypatch.setattr(Refiner, "_attempt", lambda self, whole, margin, refine: refine(margin=margin))
-    measured = {"least_stiffness": {"value": stiffness, "limit": 1.0, "holds": True}}
+    measured: dict[str, dict[str, Any]] = {"least_stiffness": {"value": stiffness, "limit": 1.0, "holds": True}}
+    unit = {"value": 0.9, "unit": "N·m"} if torque is None else {"value": torque, "unit": "share"}
+    measured["torque"] = {"limit": 1.0, "holds": True, **unit}
     told = {"replay_angle": {"value": angle, "limit": 5.0, "holds": True}}
 
     def judge(self: Refiner, *_: Any) -> Design:
@@ -319,7 +323,8 @@ def refine(
     monkeypatch.setattr(Refiner, "_replayed", played)
     whole: Any = SimpleNamespace(contacts=(0, 1), fingers=(), active=None)
     record, unused = Record(ball_task(), None, lambda _: None), SimpleNamespace()
-    refiner = Refiner(record, SimpleNamespace(torsion=float(soft)), unused, 1)  # type: ignore[arg-type]
+    model = replace(build_model(ball_task()), torsion=float(soft))
+    refiner = Refiner(record, model, unused, 1)  # type: ignore[arg-type]
     design, refined = refiner.certify(whole, (), homotopy=homotopy)
     assert (next(judged, None), next(dropped, None)) == (None, None)
     return refined.margin, design.drops or 0
@@ -346,6 +351,46 @@ def test_a_softer_grip_is_tried_instead_where_joints_are_hardly_stiff_enough(
     statuses = ["certified"] * len(drops)
     assert refine(monkeypatch, ways, 1.0, statuses, drops, stiffness=0.4) == (kept, min(drops))
     assert ways.asked == [("solve", AMPLE), *[("with_margin", SOFT)] * (len(drops) - 1)]
+
+
+@pytest.mark.parametrize(("torque", "kept"), [(0.9, SOFT), (0.7, LARGE), (None, LARGE)])
+def test_a_softer_grip_is_tried_instead_where_motors_are_hardly_strong_enough(
+    monkeypatch: pytest.MonkeyPatch, torque: float | None, kept: Margin
+) -> None:
+    ways = Ways(firm=False)
+    assert refine(monkeypatch, ways, 1.0, ["certified"] * 2, [4, 2], torque=torque) == (kept, 2)
+    assert ways.asked == [("solve", AMPLE), ("with_margin", kept)]
+
+
+@pytest.mark.parametrize(
+    ("rolls", "slides", "due"),
+    [(True, True, ["roll"]), (False, True, ["roll", "slide"]), (False, False, ["roll", "slide", "slide"])],
+)
+def test_contacts_that_may_slide_do_so_only_where_no_motion_is_exact_with_which_they_roll(
+    monkeypatch: pytest.MonkeyPatch, rolls: bool, slides: bool, due: list[str]
+) -> None:
+    tried: list[str] = []
+
+    class Either:
+        """A continuation that is exact for contacts that roll, or for such that slide, as told."""
+
+        contacts, joints = (0, 1), (1, 1)
+
+        def __init__(self, model: Any, *_: Any) -> None:
+            self.model = model
+
+        def solve(self, start: Any, margin: Margin, near: bool = False) -> Any:
+            tried.append("slide" if self.model.sliding else "roll")
+            exact = slides if self.model.sliding else rolls
+            return SimpleNamespace(exact=exact, barely_rolls=False, margin=margin, misses_less_than=lambda _: False)
+
+    monkeypatch.setattr(refiner_module, "Continuation", Either)
+    monkeypatch.setattr(Refiner, "_attempt", lambda self, whole, margin, refine: refine(margin=margin))
+    unused: Any = SimpleNamespace()
+    whole: Any = SimpleNamespace(contacts=(0, 1), fingers=(), active=None)
+    record = Record(ball_task(), None, lambda _: None)
+    Refiner(record, replace(build_model(ball_task()), sliding=0.1), unused, 1)._exact(whole, AMPLE, False, 1.0, LARGE)
+    assert tried == due
 
 
 def test_another_grip_is_tried_where_the_replay_as_planned_ends_off_its_goals(monkeypatch: pytest.MonkeyPatch) -> None:
