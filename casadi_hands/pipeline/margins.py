@@ -32,11 +32,13 @@ class Margins:
     Attributes:
         ample: to begin with.
         larger: for where replays drop the object.
+        firmer: between both, for where hands cannot grip so firmly.
         softer: for where they do because joints that are hardly stiff enough let it whirl away.
     """
 
     ample: Margin
     larger: Margin
+    firmer: Margin
     softer: Margin
 
 
@@ -50,4 +52,5 @@ def margins_for(model: Model, whole: WholeHand) -> Margins:
     asked = round(min(max(*changes, WEAKEST), FIRMEST), 2)
     ample = Margin(normal_force=min(asked, AMPLE))
     larger = replace(ample, friction=SURER, normal_force=max(asked, FIRMER * ample.normal_force))
-    return Margins(ample, larger, Margin(friction=SPARING, normal_force=WEAKEST))
+    between = round(float(np.sqrt(ample.normal_force * larger.normal_force)), 2)
+    return Margins(ample, larger, replace(ample, normal_force=between), Margin(SPARING, WEAKEST))

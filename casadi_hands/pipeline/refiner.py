@@ -95,16 +95,21 @@ class Refiner:
             design = self._replayed(self._judged(stage.model, sharp, short, planned))
             if rank_of(design) < rank_of(judged):
                 judged, refined = design, sharp
-        another, which = largest, "firmer"
+        grips = [(largest, "firmer"), (margins.firmer, "little firmer")]
         if judged.least_stiffness > HARDLY * self.record.task.actuator.stiffness or judged.share_of_torque > STRAINED:
-            another, which = margins.softer, "softer"
-        if refined.margin != another and (judged.drops or judged.replay_angle > AIM):
-            other = self._with_margin(
-                whole, refined, stage, another, f"again with a {which} grip: {judged.replay_words}"
-            )
-            design = self._replayed(self._judged(stage.model, other, short, planned))
+            grips = [(margins.softer, "softer")]
+        for another, which in grips:
+            if refined.margin == another or not (judged.drops or judged.replay_angle > AIM):
+                break
+            text = f"again with a {which} grip: {judged.replay_words}"
+            other = self._with_margin(whole, refined, stage, another, text)
+            held = self._judged(stage.model, other, short, planned)
+            design = self._replayed(held)
             if rank_of(design) < rank_of(judged):
                 return design, other
+            if held.status == "certified":  # another grip as firm is no better
+                break
+            self.record.log("refine", f"not with a {which} grip: {held.reason}")
         return judged, refined
 
     def _exact(

@@ -129,7 +129,7 @@ class HandSpec(Section):
         description="Radius of every link, m.",
         json_schema_extra={
             "default": "0.13 × palm.radius; more where a straight finger would bend by over 2 % of the object's "
-            "characteristic length under its weight over the friction, as far as contacts leave room"
+            "characteristic length under what a fingertip may press with, as far as contacts leave room"
         },
     )
     link_length: Pair = Field(

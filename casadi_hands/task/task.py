@@ -33,7 +33,7 @@ from casadi_hands.task.palm import Palm
 from casadi_hands.task.region import counted_fingers
 from casadi_hands.task.search import Search
 from casadi_hands.task.servos import servo_reach
-from casadi_hands.task.thickness import usual_link_radius
+from casadi_hands.task.thickness import usual_force, usual_link_radius
 from casadi_hands.task.weights import Weights
 
 STANDARD_GRAVITY = 9.81  # m/s²
@@ -140,7 +140,7 @@ class Task(Section):
             points = touched if len(touched) == len(fingers) else [*touched, *body.extremes]
             reach = palm.radius + _farthest_contact(palm, points, goals, info.data.get("tool"))
             gravity = float(np.linalg.norm(info.data.get("gravity", 0.0))) or STANDARD_GRAVITY
-            force = body.mass * gravity / info.data.get("friction", 1.0)
+            force = usual_force(body.mass * gravity, info.data.get("friction", 1.0), reach)
             length, material = body.characteristic_length, value.get("material")
             usual = usual_link_radius(palm.radius, length, force, reach, material, touched)
         value = fill(value, link_radius=usual)

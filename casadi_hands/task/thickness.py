@@ -16,7 +16,20 @@ from casadi_hands.task.material import DEFAULT_MATERIAL, MATERIALS, Material
 OF_PALM = 0.13
 """Of the palm's radius: the default of ``hand.link_radius`` where that is stiff enough."""
 _ROOM = 0.45  # of the distance between contacts: the most that a fingertip may take up
+_FIRM = 6.0  # weights that a fingertip may press with where the object is light, so that errors do not take it off
+_ERROR = 0.013  # N·m, of joints of the default stiffness that are off by 0.75 degrees
 _LARGEST = 0.5  # of the characteristic length: thicker, fingertips are as large as the object
+
+
+def usual_force(weight: float, friction: float, reach: float) -> float:
+    """What a fingertip may have to press with, N: to bear the object alone, or as firmly as errors of joints ask for.
+
+    Args:
+        weight: of the object, N.
+        friction: coefficient.
+        reach: of the finger, m.
+    """
+    return max(weight / friction, min(_FIRM * weight, _ERROR / reach))
 
 
 def usual_link_radius(

@@ -27,7 +27,7 @@ from tests.pipeline.replayed import replayed
 from tests.stages.example import made_up_solution
 from tests.stages.synthesis.example import ball_target, ball_task, hand, pointing
 
-AMPLE, LARGE, SOFT = Margin(), Margin(normal_force=4.0), Margin(0.65, 0.3)
+AMPLE, FIRMER, LARGE, SOFT = Margin(), Margin(normal_force=2.0), Margin(normal_force=4.0), Margin(0.65, 0.3)
 Verdict = tuple[
     int, tuple[int, ...], bool
 ]  # limits missed, contacts that cannot meet them, whether it slips hopelessly
@@ -237,7 +237,7 @@ def test_what_is_missed_only_between_samples_gets_more_of_them(
         kept = {name: Figure(name, 0.0, 1.0, "m", "") for name in refiner_module.BETWEEN}
         return SimpleNamespace(figures={**kept, missed: Figure(missed, parts.sum(), 1.0, "m", "", by_interval=parts)})
 
-    monkeypatch.setattr(refiner_module, "margins_for", lambda *_: Margins(AMPLE, LARGE, SOFT))
+    monkeypatch.setattr(refiner_module, "margins_for", lambda *_: Margins(AMPLE, LARGE, FIRMER, SOFT))
     monkeypatch.setattr(refiner_module, "Continuation", Once)
     monkeypatch.setattr(Refiner, "_with_margin", lambda *_: SimpleNamespace(exact=False))  # no grip is any better
     monkeypatch.setattr(refiner_module, "resampled", lambda hand, before, after: hand)
@@ -302,7 +302,7 @@ def refine(
     as planned ends at an angle, degrees, off a goal.
     """
     judged, dropped = iter(statuses), iter(drops)
-    monkeypatch.setattr(refiner_module, "margins_for", lambda *_: Margins(AMPLE, LARGE, SOFT))
+    monkeypatch.setattr(refiner_module, "margins_for", lambda *_: Margins(AMPLE, LARGE, FIRMER, SOFT))
     monkeypatch.setattr(refiner_module, "Continuation", lambda *_: ways)
     monkeypatch.setattr(Refiner, "_attempt", lambda self, whole, margin, refine: refine(margin=margin))
     measured: dict[str, dict[str, Any]] = {"least_stiffness": {"value": stiffness, "limit": 1.0, "holds": True}}
@@ -351,6 +351,15 @@ def test_a_softer_grip_is_tried_instead_where_joints_are_hardly_stiff_enough(
     statuses = ["certified"] * len(drops)
     assert refine(monkeypatch, ways, 1.0, statuses, drops, stiffness=0.4) == (kept, min(drops))
     assert ways.asked == [("solve", AMPLE), *[("with_margin", SOFT)] * (len(drops) - 1)]
+
+
+@pytest.mark.parametrize(("drops", "kept"), [([4, 2], FIRMER), ([4, 4], AMPLE)])
+def test_a_little_firmer_grip_is_tried_where_hands_cannot_grip_so_firmly(
+    monkeypatch: pytest.MonkeyPatch, drops: list[int], kept: Margin
+) -> None:
+    ways = Ways(firm=False)
+    assert refine(monkeypatch, ways, 1.0, ["certified", "feasible", "certified"], drops) == (kept, min(drops))
+    assert ways.asked == [("solve", AMPLE), ("with_margin", LARGE), ("with_margin", FIRMER)]
 
 
 @pytest.mark.parametrize(("torque", "kept"), [(0.9, SOFT), (0.7, LARGE), (None, LARGE)])

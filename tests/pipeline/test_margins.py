@@ -52,6 +52,7 @@ def test_it_is_what_errors_of_the_sensors_take_off_a_fingertip_s_force() -> None
         assert WEAKEST < due < FIRMEST
         assert found(stiffness).ample.normal_force == pytest.approx(min(due, AMPLE), abs=0.006)
         assert floor(stiffness) == pytest.approx(max(due, FIRMER * min(due, AMPLE)), abs=0.011)
+        assert found(stiffness).ample.normal_force < found(stiffness).firmer.normal_force < floor(stiffness)
     assert due > FIRMER * AMPLE
 
 
