@@ -20,6 +20,17 @@ _POLICY = (
     "data:; img-src 'self' data: blob:; font-src data: blob:; worker-src blob: data:; connect-src 'self' data: blob: "
     "ws://{host}; frame-ancestors 'none'; form-action 'none'; base-uri 'none'"
 )
+# viser's page is dark where its address says so; here where the browser does, and anew when that changes.
+_COLORS = b"""<script>
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  function follow() {
+    const url = new URL(location);
+    if (dark.matches) url.searchParams.set("darkMode", ""); else url.searchParams.delete("darkMode");
+    history.replaceState(null, "", url);
+  }
+  follow();
+  dark.addEventListener("change", () => { follow(); location.reload(); });
+</script>"""
 _HEADERS = {"Referrer-Policy": "no-referrer", "Cache-Control": "no-store", "X-Content-Type-Options": "nosniff"}
 
 
@@ -95,14 +106,26 @@ def guard(token: str, answer: Callable[[Any, Any], Any]) -> Callable[[Any, Any],
         known = secrets.compare_digest(given.encode(), token.encode())
         if not known or origin not in (None, f"http://{host}"):
             return connection.respond(403, "Open the address that casadi-hands studio printed.\n")
+        if "Accept-Encoding" in request.headers:
+            del request.headers["Accept-Encoding"]  # what is packed cannot be added to
         response = answer(connection, replace(request, path=f"/{rest}"))
         if response is not None:
+            _follow_colors(response)
             response.headers["Content-Security-Policy"] = _POLICY.format(host=host)
             for name, value in _HEADERS.items():
                 response.headers[name] = value
         return response
 
     return guarded
+
+
+def _follow_colors(response: Any) -> None:
+    """Let a page, in a response of `websockets`, be dark where the browser is."""
+    head = b"<head>"
+    if head in response.body[:1000]:
+        response.body = bytes(response.body).replace(head, head + _COLORS, 1)
+        del response.headers["Content-Length"]
+        response.headers["Content-Length"] = str(len(response.body))
 
 
 def _status(port: int, path: str) -> int:

@@ -22,6 +22,7 @@ from casadi_hands.studio.panel import Later, Panel
 from casadi_hands.studio.places import Place, moved, places, removed, with_finger, with_goal
 from casadi_hands.studio.results import Results
 from casadi_hands.studio.session import Session
+from casadi_hands.studio.window import View, fit
 from casadi_hands.task import Task
 
 _NOTHING = "nothing"
@@ -49,13 +50,15 @@ class Studio:
         server.scene.configure_environment_map("studio", environment_intensity=0.35)
         self._drawing = TaskDrawing(server.scene, lambda place: self.choose(place.path))
         self._add_file(gui)
+        self._besides = gui.add_html("")  # what the file's panel says, where that may be folded up
         self._add_moves(gui)
         self.results = Results(server, out, command, self._before_solve)
         self._panel = Panel(gui, self._type_field)
         gui.main_panel.dock_right()
         gui.main_panel.set_width(360)
-        self._aim()
         self._show()
+        view = self._view()
+        server.on_client_connect(lambda client: fit(client, self._file_panel, view))
 
     def close(self) -> None:
         """Stop what runs."""
@@ -63,7 +66,7 @@ class Studio:
 
     def _add_file(self, gui: Any) -> None:
         """The file's text, what check says of it, and buttons."""
-        panel = gui.add_panel()
+        panel = self._file_panel = gui.add_panel()
         later = Later()
         with panel.add_tab("Task file"):
             gui.add_html(words.STYLE)
@@ -179,6 +182,7 @@ class Studio:
         state = "not saved yet" if session.unsaved else "saved"
         self._state.content = words.told([("doubt" if session.unsaved else "good", f"{session.path}: {state}")])
         self._findings.content = words.findings_told(session.understood)
+        self._besides.content = words.STYLE + words.in_narrow_windows(self._findings.content)
         if text and self._text.value != session.text:
             self._text.value = session.text
         with suppress(HandsError):  # not YAML, as the findings say; the form stays as it was
@@ -232,17 +236,14 @@ class Studio:
         rotation = Rotation.from_quat(wxyz, scalar_first=True).as_matrix()
         self._change(lambda text, task: moved(text, task, place, position, rotation))
 
-    def _aim(self) -> None:
-        """Let the camera see the palm and the object."""
+    def _view(self) -> View | None:
+        """The palm and the object."""
         task = self.session.last.written
         if task is None:
-            return
+            return None
         points = np.array([each.position for each in places(task)])
         middle = (points.min(axis=0) + points.max(axis=0)) / 2
-        reach = float(np.linalg.norm(points - middle, axis=1).max()) + max(
-            task.palm.radius, task.object.characteristic_length
-        )
-        camera = self._server.initial_camera
-        camera.look_at = tuple(middle)
-        camera.position = tuple(middle + 2.0 * reach * eye_towards(task.palm.rotation[:, 2]))
-        camera.near = 0.01 * reach
+        size = max(task.palm.radius, task.object.characteristic_length)
+        reach = float(np.linalg.norm(points - middle, axis=1).max()) + size
+        self._server.initial_camera.near = 0.01 * reach
+        return View(middle, eye_towards(task.palm.rotation[:, 2]), reach)

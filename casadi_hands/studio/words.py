@@ -16,6 +16,12 @@ STYLE = """<style>
   .mantine-Flex-root:has(textarea) > :last-child { flex-grow: 1; }
   .studio { font-size: 0.8rem; line-height: 1.4; padding: 0.1rem 0.5rem; overflow-wrap: anywhere; }
   .studio p { margin: 0.25rem 0; padding-left: 0.5rem; border-left: 3px solid var(--mark, #9aa5b1); }
+  @media (min-width: 1200px) { .studio-narrow { display: none; } }
+  @media (max-width: 576px) {
+    textarea { min-height: 40vh !important; }
+    .mantine-Paper-root[style*="position: fixed"] { width: 100% !important; max-height: 50% !important; }
+    .mantine-Paper-root[style*="position: fixed"] .mantine-ScrollArea-content > div { width: 100% !important; }
+  }
   .studio .good { --mark: #2f9e44; } .studio .bad { --mark: #e03131; } .studio .doubt { --mark: #f08c00; }
 </style>"""
 """Of the whole page: viser shows six lines of a text, and a task file is longer."""
@@ -37,6 +43,11 @@ def findings_told(understood: Understood) -> str:
     lines += [("doubt", f"May fail: {text}") for text in understood.doubts]
     lines += [("doubt", f"Is this meant? {text}") for text in understood.questions]
     return told(lines or [("good", "The task can be used, and check finds nothing that speaks against it.")])
+
+
+def in_narrow_windows(told: str) -> str:
+    """What is said once more where panels are folded up for want of room."""
+    return f'<div class="studio-narrow">{told}</div>'
 
 
 def result_told(design: Result, name: str, running: bool) -> str:

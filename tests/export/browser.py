@@ -16,6 +16,9 @@ import pytest
 
 from casadi_hands.export.browser import MISSING, browser
 
+ARTEFACTS = Path(os.environ.get("ARTEFACTS") or Path(__file__).parents[2] / "artefacts")
+"""Pictures for people to look at, of each page at each of `SIZES`, light and dark."""
+SIZES = ((1440, 900), (768, 1024), (390, 844))
 CHROMIUM = browser()
 needs_browser = pytest.mark.skipif(CHROMIUM is None, reason=MISSING)
 _FLAGS = (
@@ -154,6 +157,12 @@ class Browser:
         """Write a PNG of the window, or of the whole page."""
         found = self.call("Page.captureScreenshot", format="png", captureBeyondViewport=whole)
         path.write_bytes(b64decode(found["data"]))
+
+    def keep(self, name: str, dark: bool, whole: bool = False) -> None:
+        """Write a picture among the artefacts."""
+        ARTEFACTS.mkdir(exist_ok=True)
+        width = self.evaluate("innerWidth")
+        self.picture(ARTEFACTS / f"{name}-{width}-{'dark' if dark else 'light'}.png", whole)
 
     def pdf(self, path: Path) -> None:
         """Print the page."""

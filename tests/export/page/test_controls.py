@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from casadi_hands.export.page.page import page_text
-from tests.export.browser import needs_browser
+from tests.export.browser import SIZES, needs_browser
 from tests.export.example import example_design, example_motion
 from tests.export.report.test_in_a_browser import contrast
 
@@ -220,7 +220,7 @@ def test_parts_are_called_what_people_call_them(opened):
 
 
 @pytest.mark.parametrize("dark", [False, True])
-@pytest.mark.parametrize(("width", "height"), [(1440, 900), (768, 1024), (390, 844)])
+@pytest.mark.parametrize(("width", "height"), SIZES)
 def test_it_fits_and_can_be_read(browser, page, tmp_path, width, height, dark):
     browser.open("about:blank")
     browser.open(page.as_uri() + "#t=1", width, height, dark)
@@ -245,6 +245,7 @@ def test_it_fits_and_can_be_read(browser, page, tmp_path, width, height, dark):
     assert (sum(ink) > sum(back)) == dark
     assert contrast(ink, back) > 7  # WCAG 2.2, 1.4.6
     browser.picture(tmp_path / "window.png")
+    browser.keep("viewer", dark)
     corner = np.asarray(Image.open(tmp_path / "window.png").convert("L"), float)[height // 2, 2]
     assert (corner < 100) == dark
     assert browser.problems == []

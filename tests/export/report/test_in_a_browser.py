@@ -97,6 +97,7 @@ def test_a_curve_is_hidden_by_its_name(opened):
 def test_it_fits_and_can_be_read(opened, width, dark):
     browser = opened
     browser.look(width, 900, dark)
+    browser.evaluate("scrollTo(0, 0)")
     plot = "document.querySelector('[data-panel=angles]')"
     browser.wait(f"{plot}.clientWidth === {plot}.querySelector('.uplot').offsetWidth")
     assert browser.evaluate("document.documentElement.scrollWidth") == width
@@ -107,6 +108,7 @@ def test_it_fits_and_can_be_read(opened, width, dark):
     )
     assert (sum(ink) > sum(card)) == dark
     assert contrast(ink, card) > 7  # WCAG 2.2, 1.4.6
+    browser.keep("report", dark, whole=True)
     small = browser.evaluate(
         "Math.min(...[...document.querySelectorAll('svg text')].map((t) => t.getBoundingClientRect().height))"
     )
