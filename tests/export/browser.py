@@ -18,6 +18,7 @@ from casadi_hands.export.browser import MISSING, browser
 
 ARTEFACTS = Path(os.environ.get("ARTEFACTS") or Path(__file__).parents[2] / "artefacts")
 """Pictures for people to look at, of each page at each of `SIZES`, light and dark."""
+_TILE = 2400  # px; taller pictures of pages are cut
 SIZES = ((1440, 900), (768, 1024), (390, 844))
 CHROMIUM = browser()
 needs_browser = pytest.mark.skipif(CHROMIUM is None, reason=MISSING)
@@ -158,11 +159,17 @@ class Browser:
         found = self.call("Page.captureScreenshot", format="png", captureBeyondViewport=whole)
         path.write_bytes(b64decode(found["data"]))
 
-    def keep(self, name: str, dark: bool, whole: bool = False) -> None:
-        """Write a picture among the artefacts."""
+    def keep(self, name: str, dark: bool) -> None:
+        """Write pictures of the page among the artefacts, one after the other down to its end."""
         ARTEFACTS.mkdir(exist_ok=True)
-        width = self.evaluate("innerWidth")
-        self.picture(ARTEFACTS / f"{name}-{width}-{'dark' if dark else 'light'}.png", whole)
+        width, height = self.evaluate("[innerWidth, Math.max(innerHeight, document.documentElement.scrollHeight)]")
+        tops = range(0, height, _TILE)
+        for k, top in enumerate(tops, start=1):
+            clip = {"x": 0, "y": top, "width": width, "height": min(_TILE, height - top), "scale": 1}
+            found = self.call("Page.captureScreenshot", format="png", captureBeyondViewport=len(tops) > 1, clip=clip)
+            part = f"-{k}" if len(tops) > 1 else ""
+            file = ARTEFACTS / f"{name}-{width}-{'dark' if dark else 'light'}{part}.png"
+            file.write_bytes(b64decode(found["data"]))
 
     def pdf(self, path: Path) -> None:
         """Print the page."""
