@@ -130,7 +130,7 @@ def test_a_body_is_a_file_that_is_there_or_not(copy: Path) -> None:
     )
     assert "cylinder" not in run(copy, load)  # whatever else it may find, such a shape is known
     (copy / "casadi_hands/geometry/bodies/cylinder.py").unlink()
-    assert "sphere: {center, radius} or capsule: {start, end, radius}" in run(copy, load)
+    assert "sphere: {radius} or capsule: {start, end, radius}" in run(copy, load)
 
 
 def test_an_exporter_is_one_file(copy: Path) -> None:

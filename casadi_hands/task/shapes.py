@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields
 from functools import cached_property, reduce
 from operator import or_
@@ -82,7 +83,7 @@ class Primitive(Section):
         moved = {name: getattr(self, name) for name in type(self).model_fields}
         for each in fields(KINDS[type(self).__name__.lower()]):
             value = moved[each.name]
-            if each.metadata["is"] == "point":
+            if each.metadata["is"] in ("point", "middle"):
                 moved[each.name] = vector(np.add(value, by))
             elif each.metadata["is"] == "points":
                 moved[each.name] = tuple(vector(np.add(point, by)) for point in value)
@@ -98,13 +99,17 @@ def _value(given: Any) -> Any:
 
 Points = Annotated[tuple[Vector, ...], Field(min_length=4, max_length=MOST_POINTS)]
 _TYPES: dict[str, Any] = {
+    "middle": Vector,
     "point": Vector,
     "points": Points,
     "positive": Positive,
     "rotation": Rotation,
     "sizes": tuple[Positive, Positive, Positive],
 }
-_DEFAULTS = {"rotation": (lambda: UPRIGHT, "not turned")}
+_DEFAULTS: dict[str, tuple[Callable[[], Any], str]] = {
+    "middle": (lambda: (0.0, 0.0, 0.0), "the object frame's origin"),
+    "rotation": (lambda: UPRIGHT, "not turned"),
+}
 
 
 def _section(kind: type[Body]) -> Any:

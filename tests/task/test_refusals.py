@@ -153,16 +153,13 @@ SPOILT = {
     "unknown shape": (
         "capsule: {start",
         "cone: {start",
-        (
-            "5: object.shapes[0]: given a mapping of cone; allowed: sphere: {center, radius} or capsule: "
-            "{start, end, radius}..."
-        ),
+        ("5: object.shapes[0]: given a mapping of cone; allowed: sphere: {radius} or capsule: {start, end, radius}..."),
     ),
     "shape without a kind": (
         "capsule: {start: [0, 0, -0.04], end: [0, 0, 0.04], radius: 0.02}",
         "{radius: 0.02, center: [0, 0, 0]}",
         (
-            "5: object.shapes[0]: given a mapping of radius, center; allowed: sphere: {center, radius} or "
+            "5: object.shapes[0]: given a mapping of radius, center; allowed: sphere: {radius} or "
             "capsule: {start, end, radius}..."
         ),
     ),

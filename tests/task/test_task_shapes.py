@@ -33,3 +33,9 @@ def test_moved() -> None:
     assert Sphere(center=(1, 2, 3), radius=0.5).moved(np.array([1, 0, -1])).center == (2, 2, 2)
     moved = Capsule(start=(0, 0, 0), end=(0, 0, 1), radius=0.5).moved(np.array([1, 0, -1]))
     assert (moved.start, moved.end) == ((1, 0, -1), (1, 0, 0))
+
+
+def test_balls_and_boxes_are_about_the_origin_unless_their_middle_is_given() -> None:
+    for name, half in (("sphere", (0.5, 0.5, 0.5)), ("box", (0.5, 1, 1.5))):
+        body = SECTIONS[name](**({"radius": 0.5} if name == "sphere" else {"size": (1, 2, 3)}))
+        assert np.array(body.bounding_box) == pytest.approx(np.array([np.negative(half), half]))

@@ -79,7 +79,7 @@ class Box(Body):
 
     kind: ClassVar[str] = "box"
     width: ClassVar[int] = 13
-    center: Array = field(metadata={"about": "Middle, m, object frame.", "is": "point"})
+    center: Array = field(metadata={"about": "Middle, m, object frame.", "is": "middle"})
     size: Array = field(
         metadata={"about": "Lengths of the sides along x, y and z before it is turned, m.", "is": "sizes"}
     )

@@ -41,7 +41,7 @@ class Sphere(Body):
 
     kind: ClassVar[str] = "sphere"
     width: ClassVar[int] = 4
-    center: Array = field(metadata={"about": "Centre, m, object frame.", "is": "point"})
+    center: Array = field(metadata={"about": "Centre, m, object frame.", "is": "middle"})
     radius: float = field(metadata={"about": "Radius, m.", "is": "positive"})
 
     @property
