@@ -17,16 +17,21 @@ def check(
         Path | None,
         typer.Option(
             metavar="FILE.html",
-            help="Write a page that shows the task: palm, object, contacts by name, goals as ghosts.",
+            help="Write a page that shows the task: palm, object, contacts by name, goals as ghosts; as FILE.png, a "
+            "picture of it.",
             show_default=False,
         ),
     ] = None,
 ) -> None:
     """Check a task file and print how it is understood; solves nothing. Exits 1 where no hand can do the task."""
     from casadi_hands.cli.task_summary import check_summary
+    from casadi_hands.errors import HandsError
     from casadi_hands.placement.place import propose
     from casadi_hands.task.loader import load_questioned
+    from casadi_hands.task.shown import escaped
 
+    if show is not None and show.suffix.lower() not in (".html", ".htm", ".png"):
+        raise HandsError(f"--show: given {escaped(str(show))}; allowed: a file that ends in .html or .png")
     loaded, questions = load_questioned(task)
     proposal = None if loaded.is_placed else propose(loaded)
     text, possible = check_summary(loaded, questions, proposal)

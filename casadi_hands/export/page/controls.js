@@ -31,7 +31,10 @@ function controls(stages) {
   found("tools").open = window.innerWidth > 900;
 
   const begin = Math.min(...stages.map((stage) => stage.span[0])), end = Math.max(...stages.map((stage) => stage.span[1]));
-  if (end <= begin) return;
+  if (end <= begin) {
+    document.body.classList.toggle("still", new URLSearchParams(location.hash.slice(1)).has("still"));
+    return;
+  }
   const [bar, player, play, back, forth, scrub, clock, speed] =
     ["bar", "player", "play", "back", "forth", "scrub", "clock", "speed"].map(found);
   const samples = [...new Set(all("samples"))].sort((one, other) => one - other);

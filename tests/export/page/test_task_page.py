@@ -9,10 +9,12 @@ from base64 import b64decode
 import numpy as np
 import pytest
 import umsgpack
+from PIL import Image
 from typer.testing import CliRunner
 
 from casadi_hands.cli.app import app
-from casadi_hands.errors import DesignError
+from casadi_hands.errors import HandsError
+from casadi_hands.export.page.film import PICTURE_SIZE
 from casadi_hands.export.page.task_page import write_task_page
 from casadi_hands.task import load_task
 from casadi_hands.task.keep_out import KeepOut
@@ -64,7 +66,7 @@ def test_a_design_with_a_hand_has_no_such_names(tmp_path):
 
 
 def test_a_place_that_cannot_be_written_is_named(tmp_path):
-    with pytest.raises(DesignError, match=r"none/task\.html: cannot be written: No such file"):
+    with pytest.raises(HandsError, match=r"none/task\.html: cannot be written: No such file"):
         write_task_page(example_task(), tmp_path / "none" / "task.html", "")
 
 
@@ -116,3 +118,19 @@ def test_boxes_that_the_palm_keeps_off_stand_where_the_task_has_them(tmp_path):
     first = poses["design/object"][:3, 3]
     assert (poses[path][:3, 3] - first) / scale + start == pytest.approx(box["center"], abs=1e-6)
     assert poses[path][:2, 0] / scale == pytest.approx([np.cos(np.radians(30)), np.sin(np.radians(30))], abs=1e-6)
+
+
+@needs_browser
+def test_check_draws_a_picture_of_the_page(tmp_path):
+    file, picture = ROOT / "problems/draw_box.yaml", tmp_path / "task.png"
+    result = CliRunner().invoke(app, ["check", str(file), "--show", str(picture)])
+    assert result.exit_code == 0, result.output
+    drawn = Image.open(picture)
+    assert drawn.size == PICTURE_SIZE
+    assert len(np.unique(np.asarray(drawn.convert("RGB")).reshape(-1, 3), axis=0)) > 1000  # not a blank page
+
+
+@pytest.mark.parametrize(("name", "words"), [("task.gif", "ends in .html or .png"), ("no/task.html", "another folder")])
+def test_where_check_cannot_draw_is_told(tmp_path, name, words):
+    result = CliRunner().invoke(app, ["check", str(ROOT / "problems/draw_box.yaml"), "--show", str(tmp_path / name)])
+    assert words in str(result.exception)
