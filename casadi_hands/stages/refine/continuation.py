@@ -37,7 +37,7 @@ from casadi_hands.stages.refine.values import Margin
 
 SPARSE, COARSE = 0.4, 0.2  # s between knots, at most
 NEARLY_EXACT = 0.1  # cost of slip and of forces that no joint actuates, of a start that is nearly exact
-FAR_OFF_LINES = 0.01  # of any constraint: a coupled motion that misses more on sparse knots does on more of them, too
+FAR_OFF_LINES = 1e-3  # of any constraint: a coupled motion that misses more on sparse knots does on more of them, too
 LEAST_STEP = 0.05  # of the homotopy parameter
 LEAST = 0.1  # homotopy parameter for which a first exact motion is looked for
 
