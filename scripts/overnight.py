@@ -81,7 +81,7 @@ def way_of(design: Design, how: str) -> tuple[str, str]:
         return WAYS[0], ""
     if design.status == "failed":
         return WAYS[3], design.reason
-    return WAYS[1] if design.missed_in_replays else WAYS[2], design.reason
+    return WAYS[2 if design.missed - design.missed_in_replays else 1], design.reason
 
 
 def row(found: Counter[str], seconds: list[float]) -> list[str]:

@@ -72,6 +72,8 @@ def test_each_way_to_end_is_told_from_all_else() -> None:
     dropped = {"replay_dropped": {"holds": False}}
     assert way_of(replace(design, status="feasible", certificate=dropped), "")[0] == WAYS[1]
     assert way_of(replace(design, status="feasible", certificate={"slip": {"holds": False}}), "")[0] == WAYS[2]
+    both = dropped | {"slip": {"holds": False}}
+    assert way_of(replace(design, status="feasible", certificate=both), "")[0] == WAYS[2]
     assert way_of(replace(design, status="failed"), "")[0] == WAYS[3]
     assert way_of(replace(design, status="failed", reason=""), "")[0] == ELSE
     assert way_of(design, "stopped after 30 min") == (ELSE, "stopped after 30 min")
