@@ -33,12 +33,14 @@ class Margins:
         ample: to begin with.
         larger: for where replays drop the object.
         firmer: between both, for where hands cannot grip so firmly.
+        looser: between this and the softer one.
         softer: for where they do because joints that are hardly stiff enough let it whirl away.
     """
 
     ample: Margin
     larger: Margin
     firmer: Margin
+    looser: Margin
     softer: Margin
 
 
@@ -52,5 +54,11 @@ def margins_for(model: Model, whole: WholeHand) -> Margins:
     asked = round(min(max(*changes, WEAKEST), FIRMEST), 2)
     ample = Margin(normal_force=min(asked, AMPLE))
     larger = replace(ample, friction=SURER, normal_force=max(asked, FIRMER * ample.normal_force))
-    between = round(float(np.sqrt(ample.normal_force * larger.normal_force)), 2)
-    return Margins(ample, larger, replace(ample, normal_force=between), Margin(SPARING, WEAKEST))
+    softer = Margin(SPARING, WEAKEST)
+    return Margins(ample, larger, _between(ample, larger), _between(ample, softer), softer)
+
+
+def _between(one: Margin, other: Margin) -> Margin:
+    """A margin between two."""
+    force = float(np.sqrt(one.normal_force * other.normal_force))
+    return Margin((one.friction + other.friction) / 2, round(force, 2))

@@ -36,6 +36,7 @@ ENOUGH = 0.7  # of a limit: intervals that contribute more are halved
 LEFT = 1 / 8  # of what an interval slips, once it is halved; a cubic spline's error falls to a sixteenth
 HARDLY = 0.3  # of the joints' stiffness: a grasp that asks for more is lost where joints are a little softer
 STRAINED = 0.8  # of the motors' torque: a plan that asks for more leaves them little for what it does not know
+NEARLY = 0.1  # of the replays: where no more drop the object, a grip in between may do
 GAIN = 0.8  # of how far limits are missed, that more samples must reach to be worth still more
 
 
@@ -97,7 +98,8 @@ class Refiner:
                 judged, refined = design, sharp
         grips = [(largest, "firmer"), (margins.firmer, "little firmer")]
         if judged.least_stiffness > HARDLY * self.record.task.actuator.stiffness or judged.share_of_torque > STRAINED:
-            grips = [(margins.softer, "softer")]
+            grips = [(margins.softer, "softer"), (margins.looser, "little softer")]
+        best = judged, refined
         for another, which in grips:
             if refined.margin == another or not (judged.drops or judged.replay_angle > AIM):
                 break
@@ -105,12 +107,11 @@ class Refiner:
             other = self._with_margin(whole, refined, stage, another, text)
             held = self._judged(stage.model, other, short, planned)
             design = self._replayed(held)
-            if rank_of(design) < rank_of(judged):
-                return design, other
-            if held.status == "certified":  # another grip as firm is no better
+            best = min(best, (design, other), key=lambda each: rank_of(each[0]))
+            if best[0].status == "certified" or (held.status == "certified" and not _nearly(best[0])):
                 break
-            self.record.log("refine", f"not with a {which} grip: {held.reason}")
-        return judged, refined
+            self.record.log("refine", f"not with a {which} grip: {design.reason}")
+        return best
 
     def _exact(
         self, whole: WholeHand, margin: Margin, near: bool, homotopy: float, larger: Margin
@@ -257,6 +258,12 @@ def intervals_to_halve(
     # What a joint does in an interval depends on the samples around it, too.
     marked |= np.append(marked[1:], False) | np.append(False, marked[:-1])
     return marked & able
+
+
+def _nearly(design: Design) -> bool:
+    """Whether all that a design misses is that a few replays fewer should drop the object."""
+    dropped = design.certificate.get("replay_dropped", {}).get("value") or 0.0
+    return design.missed == {"replay_dropped"} and dropped <= NEARLY
 
 
 def _excess(design: Design) -> float:

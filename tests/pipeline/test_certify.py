@@ -27,7 +27,8 @@ from tests.pipeline.replayed import replayed
 from tests.stages.example import made_up_solution
 from tests.stages.synthesis.example import ball_target, ball_task, hand, pointing
 
-AMPLE, FIRMER, LARGE, SOFT = Margin(), Margin(normal_force=2.0), Margin(normal_force=4.0), Margin(0.65, 0.3)
+AMPLE, FIRMER, LARGE = Margin(), Margin(normal_force=2.0), Margin(normal_force=4.0)
+LOOSER, SOFT = Margin(0.6, 0.6), Margin(0.65, 0.3)
 Verdict = tuple[
     int, tuple[int, ...], bool
 ]  # limits missed, contacts that cannot meet them, whether it slips hopelessly
@@ -237,7 +238,7 @@ def test_what_is_missed_only_between_samples_gets_more_of_them(
         kept = {name: Figure(name, 0.0, 1.0, "m", "") for name in refiner_module.BETWEEN}
         return SimpleNamespace(figures={**kept, missed: Figure(missed, parts.sum(), 1.0, "m", "", by_interval=parts)})
 
-    monkeypatch.setattr(refiner_module, "margins_for", lambda *_: Margins(AMPLE, LARGE, FIRMER, SOFT))
+    monkeypatch.setattr(refiner_module, "margins_for", lambda *_: Margins(AMPLE, LARGE, FIRMER, LOOSER, SOFT))
     monkeypatch.setattr(refiner_module, "Continuation", Once)
     monkeypatch.setattr(Refiner, "_with_margin", lambda *_: SimpleNamespace(exact=False))  # no grip is any better
     monkeypatch.setattr(refiner_module, "resampled", lambda hand, before, after: hand)
@@ -302,7 +303,7 @@ def refine(
     as planned ends at an angle, degrees, off a goal.
     """
     judged, dropped = iter(statuses), iter(drops)
-    monkeypatch.setattr(refiner_module, "margins_for", lambda *_: Margins(AMPLE, LARGE, FIRMER, SOFT))
+    monkeypatch.setattr(refiner_module, "margins_for", lambda *_: Margins(AMPLE, LARGE, FIRMER, LOOSER, SOFT))
     monkeypatch.setattr(refiner_module, "Continuation", lambda *_: ways)
     monkeypatch.setattr(Refiner, "_attempt", lambda self, whole, margin, refine: refine(margin=margin))
     measured: dict[str, dict[str, Any]] = {"least_stiffness": {"value": stiffness, "limit": 1.0, "holds": True}}
@@ -332,7 +333,8 @@ def refine(
 
 @pytest.mark.parametrize("homotopy", [1.0, 0.5])
 @pytest.mark.parametrize(
-    ("drops", "kept"), [([4, 2], LARGE), ([1, 0], LARGE), ([4, 4], AMPLE), ([4, 5], AMPLE), ([0], AMPLE)]
+    ("drops", "kept"),
+    [([4, 1], LARGE), ([4, 3], LARGE), ([1, 0], LARGE), ([4, 4], AMPLE), ([4, 5], AMPLE), ([0], AMPLE)],
 )
 def test_a_firmer_grip_is_tried_where_replays_drop_and_kept_where_they_drop_less(
     monkeypatch: pytest.MonkeyPatch, homotopy: float, drops: list[int], kept: Margin
@@ -343,7 +345,7 @@ def test_a_firmer_grip_is_tried_where_replays_drop_and_kept_where_they_drop_less
     assert ways.asked == [first, *[("with_margin", LARGE)] * (len(drops) - 1)]
 
 
-@pytest.mark.parametrize(("drops", "kept"), [([4, 2], SOFT), ([4, 4], AMPLE), ([0], AMPLE)])
+@pytest.mark.parametrize(("drops", "kept"), [([4, 3], SOFT), ([4, 4], AMPLE), ([0], AMPLE)])
 def test_a_softer_grip_is_tried_instead_where_joints_are_hardly_stiff_enough(
     monkeypatch: pytest.MonkeyPatch, drops: list[int], kept: Margin
 ) -> None:
@@ -362,12 +364,25 @@ def test_a_little_firmer_grip_is_tried_where_hands_cannot_grip_so_firmly(
     assert ways.asked == [("solve", AMPLE), ("with_margin", LARGE), ("with_margin", FIRMER)]
 
 
+@pytest.mark.parametrize(
+    ("drops", "kept"), [([4, 2, 1], LOOSER), ([4, 2, 3], SOFT), ([2, 3, 1], LOOSER), ([4, 3], SOFT), ([2, 1], SOFT)]
+)
+def test_where_hardly_too_many_replays_drop_a_grip_in_between_is_tried(
+    monkeypatch: pytest.MonkeyPatch, drops: list[int], kept: Margin
+) -> None:
+    """Two of twenty are nearly as few as the one that may."""
+    ways = Ways(firm=False)
+    tried = [SOFT, LOOSER][: len(drops) - 1]
+    assert refine(monkeypatch, ways, 1.0, ["certified"] * len(drops), drops, stiffness=0.4) == (kept, min(drops))
+    assert ways.asked == [("solve", AMPLE), *(("with_margin", margin) for margin in tried)]
+
+
 @pytest.mark.parametrize(("torque", "kept"), [(0.9, SOFT), (0.7, LARGE), (None, LARGE)])
 def test_a_softer_grip_is_tried_instead_where_motors_are_hardly_strong_enough(
     monkeypatch: pytest.MonkeyPatch, torque: float | None, kept: Margin
 ) -> None:
     ways = Ways(firm=False)
-    assert refine(monkeypatch, ways, 1.0, ["certified"] * 2, [4, 2], torque=torque) == (kept, 2)
+    assert refine(monkeypatch, ways, 1.0, ["certified"] * 2, [4, 1], torque=torque) == (kept, 1)
     assert ways.asked == [("solve", AMPLE), ("with_margin", kept)]
 
 
