@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from shutil import copyfile
 
 from casadi_hands.errors import HandsError
+from casadi_hands.export.page.page import filled, head
 from casadi_hands.task.schema import schema_line
 from casadi_hands.task.shown import escaped
 from casadi_hands.task.textfile import read
@@ -26,12 +29,14 @@ class Example:
         about: it, in a sentence.
         path: of its file.
         meshes: files that it names, beside it.
+        picture: of it, WebP; maybe not there.
     """
 
     name: str
     about: str
     path: Path
     meshes: tuple[str, ...]
+    picture: Path
 
 
 def examples() -> list[Example]:
@@ -43,7 +48,27 @@ def examples() -> list[Example]:
     folder = next((each for each in FOLDERS if each.is_dir()), None)
     if folder is None:
         raise HandsError(f"{FOLDERS[0]}: not there; install casadi-hands again")
-    return sorted((_example(path) for path in folder.rglob("*.yaml")), key=lambda each: each.name)
+    found = (_example(path, folder / "pictures" / f"{path.stem}.webp") for path in folder.rglob("*.yaml"))
+    return sorted(found, key=lambda each: each.name)
+
+
+def show_examples(path: Path) -> None:
+    """Write a page with a picture and a line of each.
+
+    Raises:
+        HandsError: the tasks are not there, or the page cannot be written.
+    """
+    cards = ""
+    for each in examples():
+        data = b64encode(each.picture.read_bytes()).decode() if each.picture.is_file() else ""
+        image = f'<img src="data:image/webp;base64,{data}" alt="{escape(each.about)}">' if data else ""
+        cards += f"<li>{image}<h2>{escape(each.name)}</h2><p>{escape(each.about)}</p></li>\n"
+    text = filled("examples.html", {"head": head("Tasks that come with casadi-hands", "examples.css"), "cards": cards})
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise HandsError(f"{path}: cannot be written: {error.strerror}; give another file") from None
 
 
 def copy_example(name: str, out: Path | None) -> Path:
@@ -87,7 +112,7 @@ def write_new(path: Path, text: str) -> None:
         raise HandsError(f"{path}: cannot be written: {error.strerror}; give another file") from None
 
 
-def _example(path: Path) -> Example:
+def _example(path: Path, picture: Path) -> Example:
     data = TaskFile(read(path), path.name).data
     meshes = [shape["mesh"]["file"] for shape in data["object"]["shapes"] if "mesh" in shape]
-    return Example(path.stem, " ".join(data["about"].split()), path, tuple(meshes))
+    return Example(path.stem, " ".join(data["about"].split()), path, tuple(meshes), picture)

@@ -73,6 +73,10 @@ def new(
 def examples(
     name: Given = None,
     out: Annotated[Path | None, typer.Option(help="File to write.", show_default="NAME.yaml")] = None,
+    show: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.html", help="Write a page with a picture of each task.", show_default=False),
+    ] = None,
 ) -> None:
     """List the tasks that come with the program, or copy one to begin with."""
     from rich.console import Console
@@ -80,12 +84,16 @@ def examples(
 
     from casadi_hands.cli import examples as shipped
 
-    if name is None:
+    if show is not None:
+        shipped.show_examples(show)
+        print(f"written: {show}\ncopy one: casadi-hands examples NAME")
+    if name is None and show is None:
         table = Table.grid(padding=(0, 2))
         for each in shipped.examples():
             table.add_row(each.name, each.about + (" (a mesh)" if each.meshes else ""))
         Console().print(table)
-        print("\ncopy one: casadi-hands examples NAME")
+        print("\nsee them: casadi-hands examples --show examples.html\ncopy one: casadi-hands examples NAME")
+    if name is None:
         return
     path = shipped.copy_example(name, out)
     print(f"written: {path}\nnext: casadi-hands solve {path}")

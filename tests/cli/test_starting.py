@@ -7,11 +7,14 @@ import re
 import shlex
 import subprocess
 import sys
+from base64 import b64decode
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import pytest
 import typer
+from PIL import Image
 from typer.testing import CliRunner
 
 from casadi_hands.cli import examples as shipped
@@ -124,6 +127,29 @@ def test_an_example_is_copied_with_all_that_it_needs(
 def test_an_example_that_is_none(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     said = error_of(["examples", "pensil"], monkeypatch, capsys)
     assert said.startswith("casadi-hands: given pensil; allowed: battery, can, circle, ")
+
+
+def test_examples_are_shown_with_a_picture_each(tmp_path: Path) -> None:
+    file = tmp_path / "there" / "examples.html"
+    assert f"written: {file}" in run("examples", "--show", file).output
+    text = file.read_text(encoding="utf-8")
+    assert re.findall(r"<h2>(\w+)</h2>", text) == [path.stem for path in sorted(PROBLEMS, key=lambda each: each.stem)]
+    pictures = [b64decode(data) for data in re.findall(r'src="data:image/webp;base64,([^"]+)"', text)]
+    assert len(set(pictures)) == len(PROBLEMS)
+    for picture in pictures:
+        assert Image.open(BytesIO(picture)).size == (320, 240)
+    assert "://" not in text
+    found = run("examples", "pencil_pick_up", "--out", tmp_path / "pencil.yaml", "--show", file)
+    assert "written" in found.output
+    assert (tmp_path / "pencil.yaml").is_file()
+
+
+def test_examples_that_cannot_be_shown_say_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("")
+    said = error_of(["examples", "--show", str(tmp_path / "file" / "examples.html")], monkeypatch, capsys)
+    assert "cannot be written" in said
 
 
 def test_examples_are_found_in_the_package_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

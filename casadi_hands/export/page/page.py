@@ -88,9 +88,9 @@ def page_text(
     return filled("page.html", parts)
 
 
-def head(title: str) -> str:
+def head(title: str, style: str = "page.css") -> str:
     """The head of a page: nothing is fetched, whoever wrote what is in it."""
-    return filled("head.html", {"title": escape(title), "style": resource("page.css")})
+    return filled("head.html", {"title": escape(title), "style": resource(style)})
 
 
 def resource(name: str) -> str:
