@@ -30,6 +30,7 @@ from casadi_hands.verify.replays.simulation import UnplayableError
 from casadi_hands.verify.report import Audit
 
 # Beyond these, where they are also beyond the limits, a motion is none: characteristic lengths, degrees, m·g.
+STRAINED = 0.8  # of the motors' torque: a plan that asks for more leaves them little for what it does not know
 FEASIBLE = {
     "goal_position": 0.02,
     "goal_angle": 1.0,
@@ -116,8 +117,13 @@ class Judge:
         judged = replace(design, certificate={**design.certificate, **seen.as_certificate()}, replays=[tried.record()])
         if design.status != "certified" or seen.certified:
             return judged
-        lost = tried.dropped_before()
-        causes = [] if lost is None else [Reason(f"{lost}, with nothing perturbed", GRASP_ADVICE, frozenset(figures))]
+        causes = []
+        if (lost := tried.dropped_before()) is not None:
+            what, advice = f"{lost}, with nothing perturbed", GRASP_ADVICE
+            if (share := design.share_of_torque) > STRAINED:
+                what += f"; as planned the motors already give {100 * share:.0f} % of their torque"
+                advice = f"stronger motors (actuator.torque), a lighter object, {advice}"
+            causes = [Reason(what, advice, frozenset(figures))]
         return replace(judged, status="feasible", reason=format_reasons(causes, missed_figures(design, seen)))
 
     def concluded(self, design: Design, jobs: int = 1) -> Design:

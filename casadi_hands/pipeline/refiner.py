@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from casadi_hands.diagnosis.reason import Reason
 from casadi_hands.diagnosis.refinement import own_reasons, refined_reason
 from casadi_hands.export.design import Design
-from casadi_hands.pipeline.judge import Judge
+from casadi_hands.pipeline.judge import STRAINED, Judge
 from casadi_hands.pipeline.margins import SMALL, margins_for
 from casadi_hands.pipeline.rank import AIM, rank_of
 from casadi_hands.pipeline.record import Record
@@ -35,7 +35,6 @@ FINEST = 0.02  # s between samples
 ENOUGH = 0.7  # of a limit: intervals that contribute more are halved
 LEFT = 1 / 8  # of what an interval slips, once it is halved; a cubic spline's error falls to a sixteenth
 HARDLY = 0.3  # of the joints' stiffness: a grasp that asks for more is lost where joints are a little softer
-STRAINED = 0.8  # of the motors' torque: a plan that asks for more leaves them little for what it does not know
 NEARLY = 0.1  # of the replays: where no more drop the object, a grip in between may do
 GAIN = 0.8  # of how far limits are missed, that more samples must reach to be worth still more
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
@@ -50,6 +51,25 @@ def test_a_hand_and_its_motion_are_audited_once(monkeypatch: pytest.MonkeyPatch)
     assert len(audits) == 1
     judges.audited(upright(0.0)[1])
     assert len(audits) == 2
+
+
+@pytest.mark.parametrize("share", [0.5, 0.95])
+def test_motors_that_give_nearly_all_they_have_are_named_where_the_object_is_dropped(
+    monkeypatch: pytest.MonkeyPatch, share: float
+) -> None:
+    dropped = Figure("replay_dropped", 1.0, 0.05, "share", "all replays drop it")
+    tried = SimpleNamespace(
+        figures=lambda: [dropped],
+        record=lambda: {"engine": "mujoco"},
+        dropped_before=lambda: "in MuJoCo the object is dropped before goal 2 at 1 s",
+    )
+    monkeypatch.setattr(judge, "run_replays", lambda *_, **__: tried)
+    torque = {"value": share, "limit": 1.0, "holds": True, "unit": "share"}
+    design = replace(upright(0.0)[1], status="certified", certificate={"torque": torque})
+    reason = Judge(*still(0.5)).replayed(design).reason
+    assert "dropped before goal 2 at 1 s, with nothing perturbed" in reason
+    assert ("as planned the motors already give 95 % of their torque" in reason) == (share > 0.8)
+    assert ("stronger motors (actuator.torque)" in reason) == (share > 0.8)
 
 
 def test_what_mujoco_does_not_take_is_feasible_and_says_why() -> None:
