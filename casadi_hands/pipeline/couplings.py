@@ -67,28 +67,28 @@ class Coupler:
         least, most = (asked, asked) if isinstance(asked, int) else (1, min(MOST, joints - 1))
         if design.status != "certified" or least >= joints:
             return counted(design)
-        begun = [(warm_start(design, self.record.task, self.model), kept_margin(design))]
+        own, margin, other = warm_start(design, self.record.task, self.model), kept_margin(design), None
         larger = _with_enough([len(finger.links) for finger in hand.fingers], self.record.task.search.max_joints)
         for motors in range(least, most + 1):
-            found = self._driven(*begun[0], motors, near=True)
+            found = self._driven(own, margin, motors, near=True)
             if found is None and larger and motors < ENOUGH:
-                begun = [*begun[:1], *(begun[1:] or self._begun(larger))]
-                found = next(filter(None, (self._driven(*each, motors, near=False) for each in begun[1:])), None)
+                other = other or self._with_joints(larger)
+                found = self._driven(other, None, motors, near=False) if other else None
             if found is not None:
                 return counted(found)
         return counted(_without(design, most, joints))
 
-    def _begun(self, joints: tuple[int, ...]) -> list[tuple[WholeHand, Margin | None]]:
+    def _with_joints(self, joints: tuple[int, ...]) -> WholeHand | None:
         """The best hand of so many joints a finger, as it is before it is refined; none where there is no search.
 
         Where contacts must go far with the object, fingers have the joints for that already.
         """
         if self.certifier is None or rolls_far(self.model):
-            return []
+            return None
         search = self.certifier.search
         candidate = search.with_joints(dict(zip(search.contacts, joints, strict=True)))[0]
         self.record.add_runs(search.take_runs())
-        return [(run_whole_hand(self.record, self.model, self.certifier.floating, candidate), None)]
+        return run_whole_hand(self.record, self.model, self.certifier.floating, candidate)
 
     def _driven(self, whole: WholeHand, margin: Margin | None, motors: int, near: bool) -> Design | None:
         """The certified design of a hand with so many motors, or None.
