@@ -1,4 +1,4 @@
-"""Draw the shipped tasks, small: palm, object, contacts and goals, as `check --show` does.
+"""Draw the shipped tasks, small: palm, object, contacts and goals.
 
     python scripts/thumbnails.py
 
@@ -8,13 +8,10 @@ Writes ``problems/pictures/NAME.webp`` for every task file, or for those that ar
 from __future__ import annotations
 
 from argparse import ArgumentParser
-from io import BytesIO
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
-from PIL import Image
-
-from casadi_hands.export.page.task_page import write_task_page
+from casadi_hands.export.page.film import pictures
+from casadi_hands.problem.result import Result
 from casadi_hands.task import load_task
 
 PROBLEMS = Path(__file__).parents[1] / "problems"
@@ -30,23 +27,13 @@ def main() -> None:
         if names and file.stem not in names:
             continue
         target = PROBLEMS / "pictures" / f"{file.stem}.webp"
-        target.parent.mkdir(exist_ok=True)
         target.write_bytes(thumbnail(file))
         print(target, f"{target.stat().st_size} bytes", flush=True)
 
 
 def thumbnail(file: Path) -> bytes:
     """The drawing of a task file, WebP."""
-    with TemporaryDirectory() as place:
-        drawn = Path(place) / "task.png"
-        write_task_page(load_task(file), drawn, "")
-        picture = Image.open(drawn).convert("RGB")
-        width = round(picture.height * SIZE[0] / SIZE[1])
-        left = (picture.width - width) // 2
-        small = picture.crop((left, 0, left + width, picture.height)).resize(SIZE, Image.Resampling.LANCZOS)
-    data = BytesIO()
-    small.save(data, "WEBP", quality=70, method=6)
-    return data.getvalue()
+    return pictures(Result(task=load_task(file), status=""), [0.0], SIZE, "webp")[0]
 
 
 if __name__ == "__main__":

@@ -68,7 +68,7 @@ def show_examples(path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise HandsError(f"{path}: cannot be written: {error.strerror}; give another file") from None
+        raise _unwritable(path, error) from None
 
 
 def copy_example(name: str, out: Path | None) -> Path:
@@ -109,7 +109,11 @@ def write_new(path: Path, text: str) -> None:
     except FileExistsError:
         raise HandsError(f"{path}: is there already; give another file, or move it away") from None
     except OSError as error:
-        raise HandsError(f"{path}: cannot be written: {error.strerror}; give another file") from None
+        raise _unwritable(path, error) from None
+
+
+def _unwritable(path: Path, error: OSError) -> HandsError:
+    return HandsError(f"{path}: cannot be written: {error.strerror}; give another file")
 
 
 def _example(path: Path, picture: Path) -> Example:

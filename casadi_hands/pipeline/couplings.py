@@ -68,10 +68,12 @@ class Coupler:
         if design.status != "certified" or least >= joints:
             return counted(design)
         own, margin, other = warm_start(design, self.record.task, self.model), kept_margin(design), None
-        larger = _with_enough([len(finger.links) for finger in hand.fingers], self.record.task.search.max_joints)
+        own_joints = [len(finger.links) for finger in hand.fingers]
+        larger = _with_enough(own_joints, self.record.task.search.max_joints)
+        lacking = sum(max(0, ENOUGH - n) for n in own_joints)
         for motors in range(least, most + 1):
             found = self._driven(own, margin, motors, near=True)
-            if found is None and larger and motors < ENOUGH:
+            if found is None and larger and motors <= lacking:
                 other = other or self._with_joints(larger)
                 found = self._driven(other, None, motors, near=False) if other else None
             if found is not None:

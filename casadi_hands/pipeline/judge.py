@@ -29,8 +29,8 @@ from casadi_hands.verify import audit_files, run_replays
 from casadi_hands.verify.replays.simulation import UnplayableError
 from casadi_hands.verify.report import Audit
 
-# Beyond these, where they are also beyond the limits, a motion is none: characteristic lengths, degrees, m·g.
 STRAINED = 0.8  # of the motors' torque: a plan that asks for more leaves them little for what it does not know
+# Beyond these, where they are also beyond the limits, a motion is none: characteristic lengths, degrees, m·g.
 FEASIBLE = {
     "goal_position": 0.02,
     "goal_angle": 1.0,

@@ -15,10 +15,9 @@ from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.placement import forces_of_joint_errors
 from casadi_hands.stages.refine.values import Margin
+from casadi_hands.task.thickness import FIRMEST, SENSOR
 
-SENSOR = np.deg2rad(0.75)  # error of a joint's sensor that must not take a finger off the object
 WEAKEST, AMPLE = 0.3, 1.5  # weights: the lower bound on the normal force to begin with is between these
-FIRMEST = 6.0  # weights, that it may be where replays drop the object
 FIRMER = 2.0  # times the one to begin with, that it is then at least
 SURER = 0.4  # share of the friction that may be used then
 SPARING = 0.65  # share of the friction that may be used where the grip is to ask for less stiffness
@@ -33,7 +32,7 @@ class Margins:
         ample: to begin with.
         larger: for where replays drop the object.
         firmer: between both, for where hands cannot grip so firmly.
-        looser: between this and the softer one.
+        looser: between the first and the softer one.
         softer: for where they do because joints that are hardly stiff enough let it whirl away.
     """
 

@@ -98,9 +98,9 @@ class Refiner:
         grips = [(largest, "firmer"), (margins.firmer, "little firmer")]
         if judged.least_stiffness > HARDLY * self.record.task.actuator.stiffness or judged.share_of_torque > STRAINED:
             grips = [(margins.softer, "softer"), (margins.looser, "little softer")]
-        best = judged, refined
+        best, enough = (judged, refined), not judged.drops and judged.replay_angle <= AIM
         for another, which in grips:
-            if refined.margin == another or not (judged.drops or judged.replay_angle > AIM):
+            if enough or refined.margin == another:
                 break
             text = f"again with a {which} grip: {judged.replay_words}"
             other = self._with_margin(whole, refined, stage, another, text)
@@ -116,16 +116,19 @@ class Refiner:
         self, whole: WholeHand, margin: Margin, near: bool, homotopy: float, larger: Margin
     ) -> tuple[Refined, Continuation]:
         """The refinement and what it was found with; contacts that may slide do so where none is exact that roll."""
-        joints = tuple(finger.joints for finger in whole.fingers)
-        for sliding in sorted({0.0, self.model.sliding}):
+
+        def found(sliding: float) -> tuple[Refined, Continuation]:
+            joints = tuple(finger.joints for finger in whole.fingers)
             model = replace(self.model, sliding=sliding)
             stage = Continuation(model, whole.contacts, joints, whole.active)
-            if sliding:
-                self.record.log("refine", "with contacts that slide, as no motion was exact with which all roll")
-            refined = self._refined(stage, whole, margin, near, homotopy, larger)
-            if refined.exact:
-                break
-        return refined, stage
+            return self._refined(stage, whole, margin, near, homotopy, larger), stage
+
+        rolling = found(0.0)
+        if rolling[0].exact or not self.model.sliding:
+            return rolling
+        self.record.log("refine", "with contacts that slide, as no motion was exact with which all roll")
+        sliding = found(self.model.sliding)
+        return sliding if sliding[0].misses_less_than(rolling[0]) else rolling
 
     def _between(
         self, whole: WholeHand, refined: Refined, stage: Continuation, short: tuple[Reason, ...], planned: Design
@@ -180,7 +183,7 @@ class Refiner:
             refined = self._attempt(whole, margin, first)
         if refined.exact or refined.barely_rolls or margin == SMALL or self.model.motors:
             return refined
-        if stage.model.sliding != self.model.sliding:
+        if stage.model.sliding != self.model.sliding:  # contacts that slide are tried first
             return refined
         with self.record.stage("refine", "again, closer to the limits of friction and normal forces"):
             second = self._attempt(whole, SMALL, again)

@@ -10,26 +10,31 @@ import numpy as np
 from pydantic import ValidationError
 
 from casadi_hands.task.fields import Vector
+from casadi_hands.task.hand import USUAL_STIFFNESS
 from casadi_hands.task.limits import USUAL_DEFLECTION
 from casadi_hands.task.material import DEFAULT_MATERIAL, MATERIALS, Material
 
 OF_PALM = 0.13
 """Of the palm's radius: the default of ``hand.link_radius`` where that is stiff enough."""
 _ROOM = 0.45  # of the distance between contacts: the most that a fingertip may take up
-_FIRM = 6.0  # weights that a fingertip may press with where the object is light, so that errors do not take it off
-_ERROR = 0.013  # N·m, of joints of the default stiffness that are off by 0.75 degrees
+SENSOR = np.deg2rad(0.75)
+"""Error of a joint's sensor, rad, that must not take a finger off the object."""
+FIRMEST = 6.0
+"""Weights, the most that a fingertip is asked to press with for that."""
 _LARGEST = 0.5  # of the characteristic length: thicker, fingertips are as large as the object
 
 
 def usual_force(weight: float, friction: float, reach: float) -> float:
-    """What a fingertip may have to press with, N: to bear the object alone, or as firmly as errors of joints ask for.
+    """What a fingertip may have to press with, N: to bear the object alone, or so that errors of joints leave it there.
+
+    Joints of the usual stiffness are meant; the task's own may be softer.
 
     Args:
         weight: of the object, N.
         friction: coefficient.
         reach: of the finger, m.
     """
-    return max(weight / friction, min(_FIRM * weight, _ERROR / reach))
+    return max(weight / friction, min(FIRMEST * weight, USUAL_STIFFNESS * float(SENSOR) / reach))
 
 
 def usual_link_radius(

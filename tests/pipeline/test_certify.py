@@ -387,16 +387,22 @@ def test_a_softer_grip_is_tried_instead_where_motors_are_hardly_strong_enough(
 
 
 @pytest.mark.parametrize(
-    ("rolls", "slides", "due"),
-    [(True, True, ["roll"]), (False, True, ["roll", "slide"]), (False, False, ["roll", "slide", "slide"])],
+    ("rolls", "slides", "due", "kept"),
+    [
+        (0.0, 0.0, ["roll"], "roll"),
+        (0.2, 0.0, ["roll", "slide"], "slide"),
+        (0.2, 0.1, ["roll", "slide", "slide"], "slide"),
+        (0.1, 0.2, ["roll", "slide", "slide"], "roll"),
+    ],
 )
 def test_contacts_that_may_slide_do_so_only_where_no_motion_is_exact_with_which_they_roll(
-    monkeypatch: pytest.MonkeyPatch, rolls: bool, slides: bool, due: list[str]
+    monkeypatch: pytest.MonkeyPatch, rolls: float, slides: float, due: list[str], kept: str
 ) -> None:
+    """What is missed least is kept; a motion is exact that misses nothing."""
     tried: list[str] = []
 
     class Either:
-        """A continuation that is exact for contacts that roll, or for such that slide, as told."""
+        """A continuation whose contacts roll or slide, and miss what is told."""
 
         contacts, joints = (0, 1), (1, 1)
 
@@ -405,16 +411,22 @@ def test_contacts_that_may_slide_do_so_only_where_no_motion_is_exact_with_which_
 
         def solve(self, start: Any, margin: Margin, near: bool = False) -> Any:
             tried.append("slide" if self.model.sliding else "roll")
-            exact = slides if self.model.sliding else rolls
-            return SimpleNamespace(exact=exact, barely_rolls=False, margin=margin, misses_less_than=lambda _: False)
+            missed = slides if self.model.sliding else rolls
+            less = partial(lambda missed, other: missed < other.missed, missed)
+            return SimpleNamespace(
+                exact=not missed, missed=missed, barely_rolls=False, margin=margin, misses_less_than=less
+            )
 
     monkeypatch.setattr(refiner_module, "Continuation", Either)
     monkeypatch.setattr(Refiner, "_attempt", lambda self, whole, margin, refine: refine(margin=margin))
     unused: Any = SimpleNamespace()
     whole: Any = SimpleNamespace(contacts=(0, 1), fingers=(), active=None)
     record = Record(ball_task(), None, lambda _: None)
-    Refiner(record, replace(build_model(ball_task()), sliding=0.1), unused, 1)._exact(whole, AMPLE, False, 1.0, LARGE)
+    refiner = Refiner(record, replace(build_model(ball_task()), sliding=0.1), unused, 1)
+    refined: Any
+    refined, stage = refiner._exact(whole, AMPLE, False, 1.0, LARGE)
     assert tried == due
+    assert (refined.missed, bool(stage.model.sliding)) == ((slides, True) if kept == "slide" else (rolls, False))
 
 
 def test_another_grip_is_tried_where_the_replay_as_planned_ends_off_its_goals(monkeypatch: pytest.MonkeyPatch) -> None:

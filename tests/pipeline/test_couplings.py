@@ -131,6 +131,8 @@ def test_hands_of_more_joints_are_tried_before_another_motor(monkeypatch: pytest
     assert found.hand is not None
     assert (found.status, found.hand.motors) == ("certified", 2)
     assert looked_for(monkeypatch, "fewest", works=3, larger=9)[1] == [11, 2, 12, 3]
+    # Four motors leave the hand of three fingers of two joints one way to go.
+    assert looked_for(monkeypatch, "fewest", works=9, larger=9)[1] == [11, 2, 12, 3, 13, 4]
     assert looked_for(monkeypatch, 2, works=2, larger=1)[1] == [2]
     assert looked_for(monkeypatch, 1, works=2, larger=1)[1] == [11]
 
