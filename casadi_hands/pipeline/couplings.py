@@ -6,7 +6,7 @@ audit and by replays that move those motors alone, is taken.
 
 A finger of fewer than three joints pushes in fewer directions than three, so that each joint it lacks takes a freedom
 from the forces, which are what fits the hand to the object where motors are few: N motors and fingers of J joints leave
-N - sum(3 - J) ways to go. Hands of more joints are therefore tried, too, before there is another motor.
+N - sum(3 - J) ways to go. Where that is none, hands of more joints are tried, too, before there is another motor.
 """
 
 from __future__ import annotations

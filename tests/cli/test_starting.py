@@ -26,7 +26,8 @@ from casadi_hands.task import load_task
 from casadi_hands.task.schema import SCHEMA_FILE, schema_line
 from casadi_hands.task.starter import MOTIONS, SIZES, Idea
 
-PROBLEMS = sorted((Path(__file__).parents[2] / "problems").rglob("*.yaml"))
+FOLDER = Path(__file__).parents[2] / "problems"
+PROBLEMS = sorted(FOLDER.rglob("*.yaml"))
 COMMANDS: dict[str, Any] = typer.main.get_command(app).commands  # type: ignore[attr-defined]
 
 
@@ -135,8 +136,8 @@ def test_examples_are_shown_with_a_picture_each(tmp_path: Path) -> None:
     text = file.read_text(encoding="utf-8")
     assert re.findall(r"<h2>(\w+)</h2>", text) == [path.stem for path in sorted(PROBLEMS, key=lambda each: each.stem)]
     pictures = [b64decode(data) for data in re.findall(r'src="data:image/webp;base64,([^"]+)"', text)]
-    assert len(set(pictures)) == len(PROBLEMS)
-    for picture in pictures:
+    for path, picture in zip(sorted(PROBLEMS, key=lambda each: each.stem), pictures, strict=True):
+        assert picture == (FOLDER / "pictures" / f"{path.stem}.webp").read_bytes()
         assert Image.open(BytesIO(picture)).size == (320, 240)
     assert "://" not in text
     found = run("examples", "pencil_pick_up", "--out", tmp_path / "pencil.yaml", "--show", file)

@@ -14,14 +14,15 @@ from typing import Any
 
 import pytest
 
+from casadi_hands.errors import HandsError
 from casadi_hands.export.browser import MISSING, browser
 
 ARTEFACTS = Path(os.environ.get("ARTEFACTS") or Path(__file__).parents[2] / "artefacts")
 """Pictures for people to look at, of each page at each of `SIZES`, light and dark."""
 _TILE = 2400  # px; taller pictures of pages are cut
 SIZES = ((1440, 900), (768, 1024), (390, 844))
-CHROMIUM = browser()
-needs_browser = pytest.mark.skipif(CHROMIUM is None, reason=MISSING)
+needs_browser = pytest.mark.browser
+"""Of tests that fail where there is no Chromium; ``-m 'not slow and not browser'`` leaves them out."""
 _FLAGS = (
     "--headless=new",
     "--remote-debugging-pipe",
@@ -47,7 +48,9 @@ class Browser:
     """
 
     def __init__(self) -> None:
-        assert CHROMIUM is not None
+        program = browser()
+        if program is None:
+            raise HandsError(MISSING)
         self.problems: list[str] = []
         self.requests: list[str] = []
         self._number, self._rest = 0, b""
@@ -56,7 +59,7 @@ class Browser:
         self._read, from_browser = os.pipe()
 
         # The browser reads commands at 3 and answers at 4.
-        command = [CHROMIUM, *_FLAGS, f"--user-data-dir={self._profile.name}", "about:blank"]
+        command = [program, *_FLAGS, f"--user-data-dir={self._profile.name}", "about:blank"]
         redirect = f'exec "$@" 3<&{to_browser} 4>&{from_browser}'
         self._process = subprocess.Popen(
             ["/bin/bash", "-c", redirect, "bash", *command],

@@ -17,7 +17,7 @@ from shared import result_folder, table_text, with_seed
 from stills import MOMENTS, SIZE
 
 from casadi_hands import load_task
-from casadi_hands.export.browser import MISSING, browser
+from tests.export.browser import needs_browser
 from tests.export.example import TASK, example_design
 
 RUNS = [
@@ -54,8 +54,6 @@ def result(file: Path, out: Path, seed: int, status: str, **changes: object) -> 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder ``out`` with the page and the table of tasks that ended in every way."""
-    if browser() is None:
-        pytest.skip(MISSING)
     root = tmp_path_factory.mktemp("gallery")
     problems, out = root / "problems", root / "out"
     good = problem(problems, "good", "# Figures 3.2c and 3.7a of CMU-RI-TR-18-36: a task.\n")
@@ -100,6 +98,7 @@ def read_cards(out: Path) -> Cards:
     return parser
 
 
+@needs_browser
 def test_page_has_a_card_for_each_task_and_shows_the_best_seed(made: Path) -> None:
     page = read_cards(made)
     # cut, good, lost, new, wrong
@@ -110,6 +109,7 @@ def test_page_has_a_card_for_each_task_and_shows_the_best_seed(made: Path) -> No
         assert all((made / link).is_file() for link in card["a"])
 
 
+@needs_browser
 def test_page_needs_no_other_file_and_no_network(made: Path) -> None:
     page = read_cards(made)
     assert page.fetched == []
@@ -123,12 +123,14 @@ def test_page_needs_no_other_file_and_no_network(made: Path) -> None:
             assert Image.open(io.BytesIO(data)).size == SIZE
 
 
+@needs_browser
 def test_moments_of_a_motion_differ(made: Path) -> None:
     pictures = read_cards(made).cards[1]["img"]
     # The example moves to and fro: start and end look the same, the middle does not.
     assert pictures[0] == pictures[-1] != pictures[MOMENTS // 2]
 
 
+@needs_browser
 def test_reasons_are_on_the_cards(made: Path) -> None:
     text = (made / "gallery.html").read_text(encoding="utf-8")
     reasons = re.findall(r'<p class="reason">(.*?)</p>', text, re.DOTALL)
@@ -137,6 +139,7 @@ def test_reasons_are_on_the_cards(made: Path) -> None:
     assert "wrong.yaml:1: " in reasons[2]
 
 
+@needs_browser
 def test_table_has_a_row_for_each_seed(made: Path) -> None:
     lines = (made / "table.md").read_text(encoding="utf-8").splitlines()
     assert len(lines) == 2 + 5 * 2

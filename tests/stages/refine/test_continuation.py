@@ -15,7 +15,7 @@ from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.resampling import resampled, resampled_model
 from casadi_hands.stages.refine.continuation import LEAST_STEP, Continuation
 from casadi_hands.stages.refine.result import Refined, Run, Worst
-from casadi_hands.stages.refine.settings import ALL_STEPS, NEARBY_STEPS
+from casadi_hands.stages.refine.settings import ALL_STEPS, COUPLING_FROM_AFAR, COUPLING_STEPS, NEARBY_STEPS
 from casadi_hands.stages.refine.values import Margin
 from tests.stages.example import everything, made_up_solution, standing
 from tests.stages.refining import carrying
@@ -222,6 +222,25 @@ def test_near_motions_take_the_short_way_and_the_long_one_where_it_fails(start: 
     assert not refined.exact
     steps = {LONG: len(ALL_STEPS), SHORT: len(NEARBY_STEPS), "hard constraints": 1}
     assert len(refined.runs) == sum(steps[way] for _, way in told.ways)
+
+
+def test_joints_that_share_motors_come_to_them_from_penalties_unless_their_motion_is_exact(start: WholeHand) -> None:
+    for near, way in ((True, COUPLING_STEPS), (False, COUPLING_FROM_AFAR)):
+        told = Told(lambda *_: True)
+        told.model = replace(MODEL, motors=1)
+        told.solve(start, Margin(), near=near)
+        assert told.ways[0] == ("sparse", names(way))
+    assert names(COUPLING_FROM_AFAR) == f"penalty {names(COUPLING_STEPS)}"
+
+
+@pytest.mark.parametrize(("violation", "again"), [(5e-4, True), (2e-3, False)])
+def test_commands_far_off_their_lines_are_not_tried_on_more_knots(
+    start: WholeHand, violation: float, again: bool
+) -> None:
+    told = Told(lambda *_: False, violation=violation)
+    told.model, told.joints = replace(MODEL, motors=1), (3, 3)
+    told.solve(start, Margin(), near=True)
+    assert [level for level, _ in told.ways] == (["sparse", "coarse"] if again else ["sparse"])
 
 
 def test_a_motion_is_lengthened_until_it_reaches_its_goals(start: WholeHand) -> None:
