@@ -116,6 +116,8 @@ def _touches(finger: FingerSpec) -> str:
     where = (
         f"touches the object at {_mm(finger.point)}" if finger.is_placed else f"may touch the object {finger.touches}"
     )
+    for each in finger.regrasps or ():
+        where += f", lets go at {each.start:g} s, from {each.end:g} s at {_mm(each.touches)}"
     return where if finger.placed is None else f"{where}, placed by the program: {finger.placed}"
 
 

@@ -26,7 +26,8 @@ Holds = tuple[tuple[int, float], ...]
 def shortened_task(task: Task) -> tuple[Task, Holds]:
     """The task without what is left out of long still stretches, and where that is held.
 
-    A stretch is still where the object stays at one pose, the palm stands, and nothing pushes the object.
+    A stretch is still where the object stays at one pose, the palm stands, no finger is to regrasp, and nothing pushes
+    the object.
 
     Args:
         task: as loaded.
@@ -35,7 +36,8 @@ def shortened_task(task: Task) -> tuple[Task, Holds]:
         The task with earlier times, and for each stretch the index of its keyframe and how long that is held, s. Its
         goals and what they ask for stay the same.
     """
-    if task.draws or task.object.attached is not None or task.palm.may_move or task.palm.motion:
+    moves = task.palm.may_move or task.palm.motion or any(finger.regrasps for finger in task.fingers.values())
+    if task.draws or task.object.attached is not None or moves:
         return task, ()
     turns, left_out, holds = task.goal_turns(), 0.0, []
     times = [task.motion[0].at]

@@ -14,25 +14,13 @@ from casadi_hands.problem.attachment import Attachment
 from casadi_hands.problem.contacts import Contact
 from casadi_hands.problem.exerted import Exerted
 from casadi_hands.problem.palm_path import PalmPath
+from casadi_hands.problem.regrasp import Regrasp
 from casadi_hands.problem.scenario import Scenario
 from casadi_hands.problem.units import Units
 from casadi_hands.terms.own import OwnTerm
 
 Array = NDArray[np.float64]
 _NO_GROUND = -1e3  # lengths
-
-
-@dataclass(frozen=True)
-class Regrasp:
-    """Contacts that are to move on the object, planned: fingers lift and touch again elsewhere, or slide there.
-
-    Attributes:
-        lifted: (N, C) bool, from its keyframe to the next; the ground's contact, if any, last.
-        patches: (N, C, 3) where contacts are wanted at the keyframes, object frame.
-    """
-
-    lifted: NDArray[np.bool_]
-    patches: Array
 
 
 @dataclass(frozen=True)

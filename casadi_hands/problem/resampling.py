@@ -116,16 +116,17 @@ def _matrix(quaternion: Array) -> Array:
 def shortened(model: Model, homotopy: float) -> Model:
     """The task for a homotopy parameter: that part of what leads from its first goal to each of the others.
 
-    No contact is planned to move. A palm moves as far as ever; scaled is what the object moves as seen from it, of an
-    attached one how far its joint moves.
+    No contact is planned to move but as the task says. A palm moves as far as ever; scaled is what the object moves as
+    seen from it, of an attached one how far its joint moves.
     """
+    regrasp = model.regrasp if model.regrasp is not None and model.regrasp.asked else None
     if model.attachment is not None:
         scaled = model.attachment.towards(homotopy)
         at = scaled.poses(scaled.goals)
-        return replace(model, attachment=scaled, goal_positions=at[:, :3], goal_vectors=at[:, 3:], regrasp=None)
+        return replace(model, attachment=scaled, goal_positions=at[:, :3], goal_vectors=at[:, 3:], regrasp=regrasp)
     seen = goals_seen_from_palm(model)
     goals = carried_by_palm(model, seen[0] + homotopy * (seen - seen[0]), model.schedule.goal_samples)
-    return replace(model, goal_positions=goals[:, :3], goal_vectors=goals[:, 3:], regrasp=None)
+    return replace(model, goal_positions=goals[:, :3], goal_vectors=goals[:, 3:], regrasp=regrasp)
 
 
 def extrapolated(model: Model, first: WholeHand, second: WholeHand, by: float) -> WholeHand:

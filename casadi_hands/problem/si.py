@@ -24,8 +24,10 @@ from casadi_hands.problem.motion import Motion
 from casadi_hands.problem.outside import attached, attachment_of, exerted_of, scenarios_of
 from casadi_hands.problem.palm_path import PalmPath
 from casadi_hands.problem.placement import object_rotation, torques_in_all
+from casadi_hands.problem.regrasp import asked_regrasp, regrasp_times
 from casadi_hands.problem.units import STANDARD_GRAVITY, Units, round_off
 from casadi_hands.task import Task
+from casadi_hands.task.rotation import rotation_matrix
 
 Array = NDArray[np.float64]
 _WITHIN = 0.9 / math.sqrt(3)  # share of a limit that each of three coordinates may use
@@ -51,7 +53,8 @@ def build_model(task: Task, whole: bool = False) -> Model:
     units = Units(length, task.object.mass * acceleration, acceleration)
     times, places, turns = zip(*task.palm.waypoints, strict=True)
     goal_times = [goal.at for goal in task.motion]
-    schedule = Schedule.of(goal_times, task.duration, task.keyframes_between, task.time_step, times)
+    stops = [*times, *regrasp_times(task)]
+    schedule = Schedule.of(goal_times, task.duration, task.keyframes_between, task.time_step, stops)
     schedule = replace(schedule, holds=holds)
     bodies = tuple(s.body.measured(lambda lengths: round_off(lengths / length)) for s in task.object.shapes)
     positions, vectors, reference = _goals(task)
@@ -102,6 +105,8 @@ def build_model(task: Task, whole: bool = False) -> Model:
     )
     if task.object.attached is not None:
         model = attached(model, attachment_of(task, units, reference))
+    regrasp = asked_regrasp(task, schedule, model.contact_names, model.patches, length)
+    model = replace(model, regrasp=regrasp)
     return model if given or not task.is_placed else replace(model, force_limit=usual_force_limit(model))
 
 
@@ -141,8 +146,11 @@ def _goals(task: Task) -> tuple[Array, Array, Array]:
     if task.draws:
         points = np.array([goal.tool_at for goal in task.motion], float)
         return points, np.zeros((len(points), 3)), np.array([1.0, 0.0, 0.0, 0.0])
-    positions = np.array([goal.position for goal in task.motion], float)
-    return positions, task.goal_turns(), quaternion(task.motion[0].rotation.matrix)
+    positions, turns = np.array([goal.position for goal in task.motion], float), task.goal_turns()
+    first = task.motion[0].rotation.matrix
+    # Far about one axis, from the middle, so that all goals are where the exponential map's coordinates serve.
+    middle = task.middle_turn
+    return positions, turns - middle, quaternion(rotation_matrix(middle) @ first)
 
 
 RESERVE = 1.5  # of torque and speed limits over what the motion uses, where the task names none

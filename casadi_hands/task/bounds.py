@@ -40,6 +40,7 @@ COUNTS = {
     "perturbations": 100,
     "keep_out": 100,
     "fingers": 20,
+    "fingers.regrasps": 50,
 }
 """Most elements of lists and mappings, by the path of their field."""
 
@@ -85,6 +86,8 @@ RANGES = {
     "at": Range(0.0, 1e6, "s"),
     "perturbations.from": Range(0.0, 1e6, "s"),
     "perturbations.to": _TIME,
+    "regrasps.from": _TIME,
+    "regrasps.to": _TIME,
     "duration": _TIME,
     "time_step": _TIME,
     "degrees": Range(0.0, 1e6, "degrees"),

@@ -11,7 +11,8 @@ from casadi_hands.task.obstacles import depth_below, depth_in_palm, palm_depth_b
 from casadi_hands.task.on_joint import joint_problems
 from casadi_hands.task.problem import Problem
 from casadi_hands.task.region import Region
-from casadi_hands.task.rotation import LARGEST_TURN
+from casadi_hands.task.regrasps import regrasp_problems
+from casadi_hands.task.rotation import LARGEST_TURN, WIDEST_TURN
 from casadi_hands.task.task import Task
 from casadi_hands.task.units import wrong_units
 
@@ -28,6 +29,7 @@ def check(task: Task) -> list[Problem]:
     if units:  # what follows from them is no second mistake
         return units
     timing = list(_goal_times(task)) + list(_goal_kinds(task)) + list(_other_times(task)) + list(_attached(task))
+    timing = timing or list(regrasp_problems(task))
     # Where things stand at the goals says nothing while the goals themselves are in doubt.
     places = [] if timing else list(_turns(task)) + list(_object_places(task)) + list(_palm_places(task))
     places += list(_keep_out(task))
@@ -108,9 +110,15 @@ def _turns(task: Task) -> Iterator[Problem]:
     """Turns of goals from the first goal's orientation."""
     if task.object.attached is not None:  # whose turns are its joint's
         return
-    for number, turn in enumerate(np.degrees(np.linalg.norm(task.goal_turns(), axis=1))):
-        if turn > LARGEST_TURN * (1 + 1e-6):
+    middle = task.middle_turn
+    most = WIDEST_TURN / 2 if middle.any() else LARGEST_TURN
+    turns = task.goal_turns()
+    sizes, counted = (np.degrees(np.linalg.norm(each, axis=1)) for each in (turns, turns - middle))
+    for number, turn in enumerate(sizes):
+        if turn > LARGEST_TURN and counted[number] > most * (1 + 1e-6):
             allowed = f"a turn of at most ±{LARGEST_TURN:g}° from the first goal's orientation; this one is {turn:.4g}°"
+            if middle.any():
+                allowed = f"turns about one axis that are at most {WIDEST_TURN:g}° apart; this one is {turn:.4g}°"
             degrees = task.motion[number].rotation.degrees
             yield Problem(("motion", number, "rotation"), f"{degrees:.4g} degrees", allowed)
 

@@ -34,8 +34,11 @@ def normalise(task: Task) -> tuple[Task, list[Problem]]:
         if not finger.is_placed:
             fingers[name] = finger
             continue
-        snapped = _snap(finger.point, task.object, ("fingers", name, "touches"), problems)
-        fingers[name] = finger.model_copy(update={"touches": snapped})
+        path: tuple[str | int, ...] = "fingers", name
+        fingers[name] = finger.touching(
+            _snap(point, task.object, (*path, *(("regrasps", n - 1) if n else ()), "touches"), problems)
+            for n, point in enumerate(finger.points)
+        )
     problems += (
         []
         if problems
@@ -49,7 +52,7 @@ def normalise(task: Task) -> tuple[Task, list[Problem]]:
     return _recentre(task.model_copy(update={"fingers": fingers, "ground": ground})), []
 
 
-def _snap(point: Vector, body: ManipulatedObject, path: tuple[str, ...], problems: list[Problem]) -> Vector:
+def _snap(point: Vector, body: ManipulatedObject, path: tuple[str | int, ...], problems: list[Problem]) -> Vector:
     """Nearest point of the surface of the nearest primitive, (3,) m; a problem if that is no contact."""
     start = np.array(point)
     distances = [abs(shape.body.signed_distance(start)) for shape in body.shapes]
@@ -115,11 +118,12 @@ def _recentre(task: Task) -> Task:
         update={
             "object": body,
             "fingers": {
-                name: finger.model_copy(
-                    update={
-                        "touches": shift(finger.point) if finger.is_placed else finger.touches.shifted(-center),
-                        "placed": finger.placed and finger.placed.shifted(-center),
-                    }
+                name: (
+                    finger.touching(map(shift, finger.points)).model_copy(
+                        update={"placed": finger.placed and finger.placed.shifted(-center)}
+                    )
+                    if finger.is_placed
+                    else finger.model_copy(update={"touches": finger.touches.shifted(-center)})
                 )
                 for name, finger in task.fingers.items()
             },

@@ -11,6 +11,8 @@ from casadi_hands.task.fields import Number, Quadruple, Section, Vector, refuse
 
 LARGEST_TURN = 300.0
 """Degrees from the first goal's orientation: the exponential map is singular at 360°, and this is near enough."""
+WIDEST_TURN = 720.0
+"""Degrees between goals that all turn about one axis: 360 to either side of the middle."""
 
 
 class _Quaternion(Section):
@@ -78,3 +80,16 @@ def rotation_matrix(vector: np.ndarray) -> np.ndarray:
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     matrix: np.ndarray = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
     return matrix
+
+
+def middle_turn(turns: np.ndarray) -> np.ndarray:
+    """The middle (3,), rad, of turns (G, 3) about one axis, where any is larger than ``LARGEST_TURN``; else zeros."""
+    far = turns[np.argmax(np.linalg.norm(turns, axis=1))]
+    size = float(np.linalg.norm(far))
+    if size <= np.radians(LARGEST_TURN) * (1 + 1e-6):
+        return np.zeros(3)
+    along = turns @ far / size
+    if np.linalg.norm(turns - np.outer(along, far / size), axis=1).max() > 1e-6:
+        return np.zeros(3)
+    middle: np.ndarray = (along.min() + along.max()) / 2 * far / size
+    return middle

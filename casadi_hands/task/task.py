@@ -31,6 +31,7 @@ from casadi_hands.task.object import ManipulatedObject
 from casadi_hands.task.on_joint import placed, resisting_force
 from casadi_hands.task.palm import Palm
 from casadi_hands.task.region import counted_fingers
+from casadi_hands.task.rotation import middle_turn
 from casadi_hands.task.search import Search
 from casadi_hands.task.servos import servo_reach
 from casadi_hands.task.thickness import usual_force, usual_link_radius
@@ -137,7 +138,8 @@ class Task(Section):
         usual, reach = 1.0, None
         if palm and body and fingers and goals:
             touched = [finger.point for finger in fingers.values() if finger.is_placed]
-            points = touched if len(touched) == len(fingers) else [*touched, *body.extremes]
+            points = [point for finger in fingers.values() if finger.is_placed for point in finger.points]
+            points += [] if len(touched) == len(fingers) else body.extremes
             reach = palm.radius + _farthest_contact(palm, points, goals, info.data.get("tool"))
             gravity = float(np.linalg.norm(info.data.get("gravity", 0.0))) or STANDARD_GRAVITY
             force = usual_force(body.mass * gravity, info.data.get("friction", 1.0), reach)
@@ -265,6 +267,14 @@ class Task(Section):
                 nearest_exponential(goal.rotation.matrix @ first.T, vector - stated[0] if parallel else turns[-1])
             )
         return np.array(turns)
+
+    @property
+    def middle_turn(self) -> np.ndarray:
+        """Rotation vector (3,), rad, world, from the first goal's orientation to the one that turns are counted from.
+
+        That orientation itself; where a free object turns far about one axis, the middle of all turns.
+        """
+        return np.zeros(3) if self.object.attached is not None else middle_turn(self.goal_turns())
 
 
 def _poses(goals: tuple[Goal, ...], tool: Vector | None) -> tuple[tuple[float, np.ndarray, np.ndarray], ...]:

@@ -21,7 +21,8 @@ import pytest
 import casadi_hands.stages
 from casadi_hands.nlp import Kernel, Parameter, Problem, Rows
 from casadi_hands.nlp.arguments import Argument, arguments_by_name
-from casadi_hands.problem.model import Model, Regrasp
+from casadi_hands.problem.model import Model
+from casadi_hands.problem.regrasp import Regrasp
 from casadi_hands.problem.si import build_model
 from casadi_hands.problem.structure import Structure
 from casadi_hands.stages.floating.stage import FloatingStage

@@ -363,20 +363,20 @@ SPOILT = {
     ),
     "turn too long": (
         "at: 2,",
-        "at: 2, rotation: {axis: [0, 0, 1], degrees: -301},",
+        "at: 2, rotation: {axis: [0, 0, 1], degrees: -721},",
         (
-            "12: motion[1].rotation: given -301 degrees; allowed: a turn of at most ±300° from the first goal's "
-            "orientation; this one is 301°"
+            "12: motion[1].rotation: given -721 degrees; allowed: turns about one axis that are at most "
+            "720° apart; this one is 721°"
         ),
     ),
-    "turn too long in all": (  # each goal 170° farther about x, from a first one that is tilted by 90° about y
+    "turn too long in all": (  # not about one axis
         MOTION,
         "motion:\n"
         "  - {at: 0, position: [0.125, 0, 0.3], rotation: {axis: [0, 1, 0], degrees: 90}}\n"
         "  - {at: 2, position: [0.125, 0, 0.3], rotation: {quaternion: [0.0616, 0.7044, 0.0616, 0.7044]}}\n"
-        "  - {at: 4, position: [0.125, 0, 0.3], rotation: {quaternion: [-0.6964, 0.1228, -0.6964, 0.1228]}}\n",
+        "  - {at: 4, position: [0.125, 0, 0.3], rotation: {quaternion: [0.7006, -0.1227, 0.6921, -0.1227]}}\n",
         (
-            "13: motion[2].rotation: given 91.73 degrees; allowed: a turn of at most ±300° from the first goal's "
+            "13: motion[2].rotation: given 91.05 degrees; allowed: a turn of at most ±300° from the first goal's "
             "orientation; this one is 340°"
         ),
     ),

@@ -187,11 +187,12 @@ def _draw_goals(node: Any, design: Result, item: Robot, radius: float) -> None:
 def _draw_contacts(node: Any, task: Task, radius: float) -> Iterator[Label]:
     """Draw where fingertips shall touch as dots on the object, and name them; those to be placed have no place yet."""
     for i, (name, finger) in enumerate(task.fingers.items()):
-        if finger.is_placed:
-            dot = node[node_name(name)]
+        for n, point in enumerate(finger.points if finger.is_placed else ()):
+            # Where it touches later, after a regrasp, is a number.
+            dot = node[node_name(f"{name} {n + 1}" if n else name)]
             dot.set_object(Sphere(_MARKER * radius), MeshLambertMaterial(color=paint(finger_color(i))))
-            dot.set_transform(shift(np.array(finger.point)))
-            yield Label(steps(dot), name, finger_color(i))
+            dot.set_transform(shift(np.array(point)))
+            yield Label(steps(dot), f"{name} {n + 1}" if n else name, finger_color(i))
 
 
 def _draw_ground(node: Any, middle: np.ndarray, radius: float, height: float) -> None:

@@ -75,27 +75,40 @@ def passes_gate(model: Model, values: Mapping[str, Array], pivots: bool = False)
     """
     if not all(np.isfinite(values[name]).all() for name in ("pose", "point", "invariant")):
         return False
-    wrenches_needed = needed_wrenches(model, values["pose"])
-    bodies, friction = model.touched, model.frictions
-    contacts = len(bodies)
-    for k in range(len(model.schedule.keyframes)):
-        points = values["point"][k].reshape(contacts, 3)
-        active = values["invariant"][k] > 0.5
-        needed = wrenches_needed[k]
-        if not active.any():
-            return False
-        grasp = model.unborne(grasp_map(points[active]))
-        all_hold = np.linalg.matrix_rank(model.unborne(grasp_map(points)), 1e-6)
-        if np.linalg.matrix_rank(grasp, 1e-6) < (min(all_hold, _PIVOT_RANK) if pivots else all_hold):
-            return False
-        inward = inward_normals(points[active], list(compress(bodies, active)))
-        edges = friction_edges(inward, friction[active])
-        wrenches = np.vstack([edges, np.zeros((3, edges.shape[1]))])
-        for i, point in enumerate(points[active]):
-            span = slice(i * EDGES, (i + 1) * EDGES)
-            wrenches[3:, span] = np.cross(point[None, :], edges[:, span].T).T
-        fingers = int(active[: model.contacts].sum())
-        twists = torsion_edges(points[active][:fingers], inward[:fingers], model.torsion)
-        if nonnegative_fit(model.unborne(np.hstack([wrenches, twists])), needed)[1] > _GATE:
-            return False
-    return True
+    contacts = len(model.touched)
+    return all(
+        can_hold(model, point.reshape(contacts, 3), invariant > 0.5, needed, pivots)
+        for point, invariant, needed in zip(
+            values["point"], values["invariant"], needed_wrenches(model, values["pose"]), strict=True
+        )
+    )
+
+
+def can_hold(
+    model: Model, points: Array, active: NDArray[np.bool_], needed: Array, pivots: bool = False, share: float = 1.0
+) -> bool:
+    """Whether the active contacts can make a wrench, and have the rank of all contacts.
+
+    Args:
+        model: the task.
+        points: (C, 3) of all contacts, object frame.
+        active: (C,) which of them act.
+        needed: wrench, as from ``needed_wrenches``.
+        pivots: whether the rank of two contacts is enough.
+        share: of the friction that may be used.
+    """
+    if not active.any():
+        return False
+    grasp = model.unborne(grasp_map(points[active]))
+    all_hold = np.linalg.matrix_rank(model.unborne(grasp_map(points)), 1e-6)
+    if np.linalg.matrix_rank(grasp, 1e-6) < (min(all_hold, _PIVOT_RANK) if pivots else all_hold):
+        return False
+    inward = inward_normals(points[active], list(compress(model.touched, active)))
+    edges = friction_edges(inward, share * model.frictions[active])
+    wrenches = np.vstack([edges, np.zeros((3, edges.shape[1]))])
+    for i, point in enumerate(points[active]):
+        span = slice(i * EDGES, (i + 1) * EDGES)
+        wrenches[3:, span] = np.cross(point[None, :], edges[:, span].T).T
+    fingers = int(active[: model.contacts].sum())
+    twists = torsion_edges(points[active][:fingers], inward[:fingers], share * model.torsion)
+    return nonnegative_fit(model.unborne(np.hstack([wrenches, twists])), needed)[1] <= _GATE

@@ -6,7 +6,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from casadi_hands.problem.model import Model, Regrasp, palm_from_world
+from casadi_hands.problem.model import Model, palm_from_world
+from casadi_hands.problem.regrasp import Regrasp
 
 Array = NDArray[np.float64]
 # That a contact travels around the object, seen from the palm: beyond it fingers reach around.
@@ -27,16 +28,16 @@ def planned_regrasp(model: Model, pose: Array) -> Regrasp | None:
     Returns:
         The plan, or None where every contact can stay.
     """
-    turns, keyframes = _turns(model, pose), model.schedule.keyframes
+    turns, keyframes = turns_seen(model, pose), model.schedule.keyframes
     patches = model.keyframe_patches.copy()
     lifted = np.zeros(patches.shape[:2], bool)
     for c in range(model.contacts):
         taken = turns[0] @ patches[0, c]  # where a finger takes the object, palm frame from its centre
         for k in range(1, len(keyframes)):
             # The last keyframe is too late to touch again.
-            if _angle(turns[k] @ patches[k, c], taken) > FARTHEST and k < len(keyframes) - 1:
+            if angle_between(turns[k] @ patches[k, c], taken) > FARTHEST and k < len(keyframes) - 1:
                 lifted[k - 1, c] = True
-                patches[k:, c] = _on_surface(model, c, turns[k].T @ taken)
+                patches[k:, c] = model.touched[c].on_surface(turns[k].T @ taken)
     return Regrasp(lifted, patches) if lifted.any() else None
 
 
@@ -49,22 +50,22 @@ def limited_travel(model: Model, pose: Array) -> Regrasp:
         model: the task.
         pose: (N, 6) of the object at the keyframes.
     """
-    turns, patches = _turns(model, pose), model.keyframe_patches.copy()
+    turns, patches = turns_seen(model, pose), model.keyframe_patches.copy()
     for c in range(model.contacts):
         taken = turns[0] @ patches[0, c]
         for k in range(1, len(turns)):
             carried = turns[k] @ patches[k - 1, c]
             patches[k, c] = patches[k - 1, c]
-            beyond = _angle(carried, taken) - MOST_TRAVEL
+            beyond = angle_between(carried, taken) - MOST_TRAVEL
             if beyond > 0:
                 axis = np.cross(carried, taken)
                 back = pin.exp3(beyond * axis / np.linalg.norm(axis)) @ carried
-                patches[k, c] = _on_surface(model, c, turns[k].T @ back)
+                patches[k, c] = model.touched[c].on_surface(turns[k].T @ back)
     return Regrasp(np.zeros(patches.shape[:2], bool), patches)
 
 
-def _turns(model: Model, pose: Array) -> list[Array]:
-    """Rotations (3, 3) of the object at the keyframes, palm frame."""
+def turns_seen(model: Model, pose: Array) -> list[Array]:
+    """Rotations (3, 3) of the object at the keyframes, palm frame; pose (N, 6)."""
     reference = pin.Quaternion(*model.reference).matrix()
     return [
         palm_from_world(model, t)[0] @ pin.exp3(row[3:]) @ reference
@@ -72,9 +73,6 @@ def _turns(model: Model, pose: Array) -> list[Array]:
     ]
 
 
-def _on_surface(model: Model, contact: int, point: Array) -> Array:
-    return model.touched[contact].on_surface(point)
-
-
-def _angle(first: Array, second: Array) -> float:
+def angle_between(first: Array, second: Array) -> float:
+    """Of two vectors (3,), rad."""
     return float(np.arctan2(np.linalg.norm(np.cross(first, second)), first @ second))

@@ -13,37 +13,51 @@ from casadi_hands.motion import linear
 from casadi_hands.nlp import Options, Problem, Solution, Solver
 from casadi_hands.problem.floating_motion import Floating
 from casadi_hands.problem.model import Model, sizes
+from casadi_hands.stages.floating.gait import ROLLED, farthest_turn, gait
 from casadi_hands.stages.floating.gate import least_squares_forces, passes_gate
 from casadi_hands.stages.floating.regrasp import limited_travel, planned_regrasp
 from casadi_hands.stages.object_motion.binding import bind_object, declare_object
-from casadi_hands.stages.object_motion.values import least_contacts, object_parameters, straight_path, term_weights
+from casadi_hands.stages.object_motion.values import (
+    least_contacts,
+    object_parameters,
+    point_bounds,
+    straight_path,
+    term_weights,
+)
 from casadi_hands.stages.own_terms import bind_own, contact_names, own_missed
 
 Array = NDArray[np.float64]
 THRESHOLDS = (0.1, 0.2, 0.3)
-REGRASP_ROOM = 0.15  # lengths about its patches, for a contact that is regrasped
 OPTIONS = Options(max_iter=300, tol=1e-4, acceptable_tol=1e-3)
 # An adaptive barrier is quickest, but without a bound it was seen to grow until nothing converged; a small one that
 # only shrinks is for where it still does not.
-BARRIERS = (
+BARRIERS: tuple[Options, ...] = (
     replace(OPTIONS, extra=(("mu_strategy", "adaptive"), ("mu_max", 0.1))),
     replace(OPTIONS, mu_init=1e-2),
 )
 # Where contacts travel less: an adaptive barrier grew and shrank there until its cap in three of eight tasks.
-LIMITED_TRAVEL = (replace(OPTIONS, mu_init=1e-3), *BARRIERS)
+LIMITED_TRAVEL: tuple[Options, ...] = (replace(OPTIONS, mu_init=1e-3), *BARRIERS)
+GAIT = tuple(replace(options, max_iter=1000) for options in LIMITED_TRAVEL)  # more happens in them
 BROKEN = 1e-3  # violation of friction's cones: forces of zero meet them, so what leaves more has broken down
 
 
 def solve_floating(model: Model, weights: Mapping[str, float]) -> Floating:
     """Stage 1; contacts that would travel too far around the object are regrasped if others can hold it meanwhile.
 
-    Where they cannot, contacts have their travel limited, which fingers at least can follow.
+    Where they cannot at once, they do so one after the other, or contacts have their travel limited, which fingers at
+    least can follow; first what is likelier to succeed with how far the object turns.
     """
     floating = FloatingStage(model).solve(weights)
+    if model.regrasp is not None:  # as the task says
+        return floating
     regrasp = planned_regrasp(model, floating.pose)
     if regrasp is None:
         return floating
-    for plan in (regrasp, limited_travel(model, floating.pose)):
+    others = [limited_travel(model, floating.pose)]
+    walking = gait(model, floating.pose)
+    if walking is not None:
+        others.insert(0 if farthest_turn(model, floating.pose) > ROLLED else 1, walking)
+    for plan in (regrasp, *others):
         replanned = FloatingStage(replace(model, regrasp=plan)).solve_regrasp(floating, weights)
         if replanned is not None:
             return replanned
@@ -88,17 +102,21 @@ class FloatingStage:
         threshold passes, all contacts stay active.
         """
         parameters = object_parameters(self.model) | term_weights(self.solver.problem, self.model, weights)
-        free = self._solved(self.start(), parameters)
+        least, most = self._touching()
+        start = self.start()
+        start["invariant"] = np.clip(start["invariant"], least, most)
+        free = self._solved(start, parameters, *self._bounds(least, most))
         runs = [("free", free)]
         best: tuple[float, float, Solution] | None = None
+        pivots = self.model.regrasp is not None
         for flags, threshold in self._candidates(free.values["invariant"]):
-            solution = self._with_flags(flags, free.values, parameters)
+            solution = self._with_flags(np.clip(flags, least, most), free.values, parameters)
             runs.append((f"threshold {threshold}", solution))
             better = solution.objective < (np.inf if best is None else best[1])
-            if better and passes_gate(self.model, solution.values) and not own_missed(solution):
+            if better and passes_gate(self.model, solution.values, pivots) and not own_missed(solution):
                 best = (threshold, solution.objective, solution)
         if best is None:
-            solution = self._with_flags(np.ones_like(free.values["invariant"]), free.values, parameters)
+            solution = self._with_flags(most, free.values, parameters)
             best = (0.0, solution.objective, solution)
             runs.append(("all active", solution))
         threshold, _, chosen = best
@@ -124,16 +142,12 @@ class FloatingStage:
         flags = (before.active & ~self.model.regrasp.lifted).astype(float)
         if flags.sum(axis=1).min() < least_contacts(self.model):
             return None
-        fixed = {"invariant": flags}
-        # Free, a contact that is to touch elsewhere would touch near where it was and slide there.
-        patches = self.model.keyframe_patches
-        moved = np.any(patches != patches[0], axis=(0, 2))
-        room = np.where(moved, REGRASP_ROOM, np.inf)[None, :, None]
-        lower, upper = ({**fixed, "point": (patches + side * room).reshape(keyframes, -1)} for side in (-1, 1))
-        what, barriers = (
-            ("regrasp", BARRIERS) if self.model.regrasp.lifted.any() else ("limited contact travel", LIMITED_TRAVEL)
-        )
-        solution = self._solved({**start, **fixed}, parameters, lower, upper, barriers)
+        lower, upper = self._bounds(flags, flags)
+        lifts = self.model.regrasp.lifted.sum()
+        what, barriers = ("regrasp", BARRIERS) if lifts else ("limited contact travel", LIMITED_TRAVEL)
+        if lifts > self.model.contacts:
+            what, barriers = "gait", GAIT
+        solution = self._solved({**start, "invariant": flags}, parameters, lower, upper, barriers)
         if not passes_gate(self.model, solution.values, pivots=True):
             return None
         return self._like(before, flags, solution, (*before.runs, (what, solution)))
@@ -144,6 +158,19 @@ class FloatingStage:
         flags = other.active.astype(float)
         solution = self._with_flags(flags, self.start(), parameters)
         return self._like(other, flags, solution, (("part of the way", solution),))
+
+    def _touching(self) -> tuple[Array, Array]:
+        """Least and largest contact invariants (N, C): fingers that regrasp touch all the time else."""
+        least = np.zeros((sizes(self.model)[0], sizes(self.model)[2]))
+        regrasp = self.model.regrasp
+        if regrasp is None:
+            return least, least + 1
+        return np.where(regrasp.lifted.any(axis=0), ~regrasp.lifted, least), (~regrasp.lifted).astype(float)
+
+    def _bounds(self, least: Array, most: Array) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Bounds of the invariants (N, C), and of contacts that are planned to touch elsewhere."""
+        lower, upper = point_bounds(self.model)
+        return {"invariant": least, "point": lower}, {"invariant": most, "point": upper}
 
     def _solved(
         self,
@@ -192,5 +219,4 @@ class FloatingStage:
     def _with_flags(
         self, flags: Array, start: Mapping[str, ArrayLike], parameters: Mapping[str, Array | float]
     ) -> Solution:
-        fixed = {"invariant": flags}
-        return self._solved({**start, **fixed}, parameters, fixed, fixed)
+        return self._solved({**start, "invariant": flags}, parameters, *self._bounds(flags, flags))

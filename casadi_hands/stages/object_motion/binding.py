@@ -11,7 +11,7 @@ from casadi_hands.nlp import Problem, Rows
 from casadi_hands.problem.model import Model, sizes
 from casadi_hands.problem.palm_motion import added_to_spline
 from casadi_hands.stages.object_motion import kernels
-from casadi_hands.stages.object_motion.values import least_contacts, pose_bounds
+from casadi_hands.stages.object_motion.values import least_contacts, point_bounds, pose_bounds
 
 Array = NDArray[np.float64]
 
@@ -47,7 +47,8 @@ def declare_object(problem: Problem, model: Model) -> ObjectSide:
     schedule, most = model.schedule, model.force_limit
     keyframes, samples, contacts = sizes(model)
     pose = problem.variable("pose", (keyframes, 6), *pose_bounds(model))
-    point = problem.variable("point", (keyframes, 3 * contacts))
+    asked = model.regrasp is not None and model.regrasp.asked
+    point = problem.variable("point", (keyframes, 3 * contacts), *(point_bounds(model) if asked else ()))
     force = problem.variable("force", (samples, 3 * contacts), -most, most)
     invariant = problem.variable("invariant", (keyframes, contacts), 0, 1)
     disturbed = [

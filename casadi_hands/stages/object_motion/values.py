@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,8 @@ from casadi_hands.stages.own_terms import own_values
 
 Array = NDArray[np.float64]
 GOAL_TOLERANCE = 5e-4  # lengths and rad, each coordinate: the task's cost alone gives way to slow accelerations
-MOST_TURN = 5.6  # rad, up to where the exponential map's coordinates are used
+REGRASP_ROOM = 0.15  # lengths about its patches, for a contact that is regrasped
+MOST_TURN = 5.6  # rad, up to where the exponential map's coordinates are used where goals do not turn farther
 
 
 def least_contacts(model: Model) -> int:
@@ -57,6 +58,11 @@ def carried_acceleration(model: Model) -> Array:
     return np.asarray((after - 2 * now + before) / schedule.step**2)
 
 
+def most_turn(model: Model) -> float:
+    """Bound of each coordinate of the object's orientation, rad."""
+    return max(MOST_TURN, 1.02 * float(np.abs(model.goal_vectors).max()))
+
+
 def pose_bounds(model: Model) -> tuple[Array, Array]:
     """Box bounds (N, 6) of the keyframe poses: close to the goals, else as far as coordinates serve.
 
@@ -64,13 +70,37 @@ def pose_bounds(model: Model) -> tuple[Array, Array]:
     """
     if model.attachment is not None:
         return straight_path(model), straight_path(model)
-    widest = np.tile([np.inf] * 3 + [MOST_TURN] * 3, (sizes(model)[0], 1))
+    widest = np.tile([np.inf] * 3 + [most_turn(model)] * 3, (sizes(model)[0], 1))
     lower, upper = -widest, widest
     if model.tool is None:
         goals = model.goal_poses
         chosen = list(model.schedule.goals)
         lower[chosen], upper[chosen] = goals - GOAL_TOLERANCE, goals + GOAL_TOLERANCE
     return lower, upper
+
+
+def point_bounds(model: Model) -> tuple[Array, Array]:
+    """Bounds (N, 3C) of contact points at the keyframes: near their patches, of contacts that are to touch elsewhere.
+
+    Free, such a contact would touch near where it was and slide there.
+    """
+    patches = model.keyframe_patches
+    moved = np.any(patches != patches[0], axis=(0, 2))
+    room = np.where(moved, REGRASP_ROOM, np.inf)[None, :, None]
+    return (patches - room).reshape(len(patches), -1), (patches + room).reshape(len(patches), -1)
+
+
+def landing_bounds(model: Model, contacts: Sequence[int]) -> tuple[Array, Array]:
+    """Bounds (S, 3C) of some contacts' points at the samples: near where fingers are asked to touch again."""
+    samples, chosen = len(model.schedule.samples), list(contacts)
+    high = np.full((samples, len(chosen), 3), np.inf)
+    low = -high
+    if model.regrasp is not None and model.regrasp.asked:
+        lifted, patches = model.regrasp.lifted[:, chosen], model.regrasp.patches[:, chosen]
+        k, c = np.nonzero(lifted[:-1] & ~lifted[1:])
+        at = model.schedule.keyframe_samples[k + 1]
+        low[at, c], high[at, c] = patches[k + 1, c] - REGRASP_ROOM, patches[k + 1, c] + REGRASP_ROOM
+    return low.reshape(samples, -1), high.reshape(samples, -1)
 
 
 def object_parameters(model: Model) -> dict[str, Array | float]:

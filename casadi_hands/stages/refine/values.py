@@ -14,7 +14,7 @@ from casadi_hands.motion import continuous
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.placement import contact_jacobians, contact_spins
-from casadi_hands.stages.object_motion.values import MOST_TURN, tool_path
+from casadi_hands.stages.object_motion.values import landing_bounds, most_turn, tool_path
 from casadi_hands.stages.own_terms import own_values
 from casadi_hands.stages.refine import attached
 from casadi_hands.stages.refine.coupling import start as coupling_start
@@ -123,7 +123,7 @@ class RefineValues:
         """Lower and upper bounds of variables: goals, rest at both ends, no force where there is no contact."""
         model, schedule = self.model, self.model.schedule
         count = len(schedule.samples)
-        pose = np.tile([np.inf] * 3 + [MOST_TURN] * 3, (count, 1))
+        pose = np.tile([np.inf] * 3 + [most_turn(model)] * 3, (count, 1))
         low_pose, high_pose = -pose, pose
         if model.tool is None:
             goals = model.goal_poses
@@ -133,9 +133,8 @@ class RefineValues:
         rate[[0, *schedule.hold_samples, -1]] = 0.0
         most = model.force_limit
         bearing, active = (np.repeat(np.where(f, most, 0.0), 3, axis=1) for f in (self.bearing, self._active))
-        upper = {"rate": rate, "force": bearing}
-        if model.attachment is not None:  # whose rates follow from its joint's
-            upper = {"force": bearing}
+        # An attached object's rates follow from its joint's.
+        upper = {"force": bearing} | ({"rate": rate} if model.attachment is None else {})
         if model.torsion:
             upper["torsion"] = np.where(self.bearing[:, : len(self.structure.contacts)], most, 0.0)
         if model.sliding:
@@ -146,6 +145,7 @@ class RefineValues:
             upper["force_disturbed"] = active[self.disturbed]
         lower = {name: -bound for name, bound in upper.items()}
         joint_lower, joint_upper = attached.bounds(model)
+        lower["point"], upper["point"] = landing_bounds(model, self.structure.columns)
         return {"pose": low_pose, **lower, **joint_lower}, {"pose": high_pose, **upper, **joint_upper}
 
     def start(self, motion: WholeHand) -> dict[str, Array]:

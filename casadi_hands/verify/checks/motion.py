@@ -8,11 +8,18 @@ from casadi_hands.verify.reading.folder import Folder
 
 LONGEST_STEP = 0.1
 """s between samples."""
+NEAR = 0.2
+"""Of the object's longest half: how far from where the task says a finger may touch after a regrasp."""
 
 
 def motion_problems(folder: Folder) -> list[str]:
     """Return what is wrong with times, orientations and contacts, a sentence each."""
-    return [*_time_problems(folder), *_contact_problems(folder), *_idle_problems(folder)]
+    return [
+        *_time_problems(folder),
+        *_contact_problems(folder),
+        *_idle_problems(folder),
+        *regrasp_problems(folder),
+    ]
 
 
 def _time_problems(folder: Folder) -> list[str]:
@@ -57,4 +64,34 @@ def _idle_problems(folder: Folder) -> list[str]:
             k, c = np.unravel_index(np.argmax(idle), idle.shape)
             at = f"at {motion.time[k]:.3g} s{words}"
             problems.append(f"contact '{motion.contact_names[c]}' bears {idle[k, c]:.3g} N {at}, though not active")
+    return problems
+
+
+def regrasp_problems(folder: Folder) -> list[str]:
+    """Return which fingers do not let go and touch again when and where the task says."""
+    motion, problems = folder.motion, []
+    room = NEAR * folder.task.object.characteristic_length
+    for name, finger in folder.task.fingers.items():
+        if not finger.regrasps:
+            continue
+        if name not in motion.contact_names:
+            problems.append(f"contact '{name}': the task has it regrasp, and the hand has no such finger")
+            continue
+        c = motion.contact_names.index(name)
+        free = np.zeros(len(motion.time), bool)
+        for each in finger.regrasps:
+            free |= (motion.time > each.start - 1e-6) & (motion.time < each.end - 1e-6)
+            k = int(np.argmin(np.abs(motion.time - each.end)))
+            off = float(np.linalg.norm(motion.contact_point_object[k, c] - np.array(each.touches)))
+            if off > room:
+                problems.append(
+                    f"contact '{name}' touches {1e3 * off:.4g} mm from where the task has it regrasp at"
+                    f" {each.end:g} s; {1e3 * room:.4g} mm are allowed"
+                )
+        # A contact acts from the sample at which it touches to that at which it lifts.
+        wrong = motion.contact_active[:-1, c] == free[:-1]
+        if wrong.any():
+            k = int(np.argmax(wrong))
+            has, due = ("touches", "has let go") if free[k] else ("does not touch", "touches")
+            problems.append(f"contact '{name}' {has} at {motion.time[k]:.3g} s, where it {due} by the task's regrasps")
     return problems

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from casadi_hands.problem.model import Model, Regrasp, sampled_points
+from casadi_hands.problem.model import Model, sampled_points
+from casadi_hands.problem.regrasp import Regrasp
 from casadi_hands.problem.si import build_model
 from casadi_hands.stages.floating import stage as floating_stage
 from casadi_hands.stages.floating.gate import passes_gate
