@@ -39,8 +39,9 @@ class Units:
 
 
 def round_off(value: Any) -> Any:
-    """Numbers to 12 significant digits."""
+    """Numbers to 12 significant digits; those with fewer, too small to have more, become zero."""
     array = np.asarray(value, float)
+    array = np.where(np.abs(array) < np.finfo(float).tiny, 0.0, array)
     magnitude = np.where(array == 0, 1.0, 10.0 ** np.floor(np.log10(np.abs(np.where(array == 0, 1.0, array)))))
     rounded = np.round(array / magnitude, _DIGITS) * magnitude
     return float(rounded) if array.ndim == 0 else rounded

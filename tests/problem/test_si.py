@@ -14,6 +14,7 @@ from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.motion import Motion
 from casadi_hands.problem.outcome import whole_hand_motion
 from casadi_hands.problem.si import build_model, hand_of, joint_loads
+from casadi_hands.problem.units import round_off
 from casadi_hands.task import Task, parse_task
 from tests.stages.example import PinFinger, everything, everything_text
 from tests.stages.refining import MadeUp, carrying, sketching
@@ -130,3 +131,11 @@ def test_fingers_stand_on_the_palm_s_face(made_up: MadeUp) -> None:
     for built, finger in zip(hand.fingers, made_up.start.fingers, strict=True):
         np.testing.assert_allclose(built.base[:2], finger.base * model.units.length, rtol=1e-12)
         assert built.base[2] == pytest.approx(1.05 * 0.006, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("value", "rounded"), [(5e-324, 0.0), (-1e-310, 0.0), (0.0, 0.0), (1.23456789012345e-300, 1.234567890123e-300)]
+)
+def test_numbers_of_any_size_are_rounded(value: float, rounded: float) -> None:
+    assert round_off(value) == pytest.approx(rounded, rel=1e-14, abs=0.0)
+    np.testing.assert_allclose(round_off([value, 1.0]), [rounded, 1.0], rtol=1e-14)
