@@ -63,8 +63,8 @@ class Refiner:
         """Refine one hand with a margin, and with others where that fails.
 
         A small one where no motion is exact, and another lower bound on normal forces where the audit refuses one that
-        is. Where replays drop the object or end off its goals, a firmer grip or, where the joints are hardly stiff
-        enough or motors hardly strong enough, a softer one.
+        is: a smaller one where joints are not stiff enough. Where replays drop the object or end off its goals, a
+        firmer grip or, where the joints are hardly stiff enough or motors hardly strong enough, a softer one.
 
         Args:
             whole: the hand and its motion.
@@ -83,6 +83,8 @@ class Refiner:
         if refined.exact and judged.status != "certified" and not stage.passes_through(refined):
             # Where joints barely push, fingers may fold over in an instant: other forces take them another way.
             margin, which = (margins.ample, "smaller") if refined.margin == largest else (largest, "larger")
+            if "least_stiffness" in judged.missed:  # which asks for less, the less fingers press
+                margin, which = margins.softer, "smaller"
             text = f"again with a {which} lower bound on normal forces: {judged.reason}"
             other = self._with_margin(whole, refined, stage, margin, text)
             design, other, halved = self._between(whole, other, stage, short, planned)

@@ -306,7 +306,9 @@ def refine(
     monkeypatch.setattr(refiner_module, "margins_for", lambda *_: Margins(AMPLE, LARGE, FIRMER, LOOSER, SOFT))
     monkeypatch.setattr(refiner_module, "Continuation", lambda *_: ways)
     monkeypatch.setattr(Refiner, "_attempt", lambda self, whole, margin, refine: refine(margin=margin))
-    measured: dict[str, dict[str, Any]] = {"least_stiffness": {"value": stiffness, "limit": 1.0, "holds": True}}
+    measured: dict[str, dict[str, Any]] = {
+        "least_stiffness": {"value": stiffness, "limit": 1.0, "holds": stiffness <= 1.0}
+    }
     unit = {"value": 0.9, "unit": "N·m"} if torque is None else {"value": torque, "unit": "share"}
     measured["torque"] = {"limit": 1.0, "holds": True, **unit}
     told = {"replay_angle": {"value": angle, "limit": 5.0, "holds": True}}
@@ -470,6 +472,14 @@ def test_where_the_audit_refuses_an_exact_motion_a_firmer_grip_is_judged(
     drops = [0] if second == "certified" else []
     assert refine(monkeypatch, ways, 1.0, ["feasible", second], drops) == (kept, 0)
     assert ways.asked == [("solve", AMPLE), ("with_margin", LARGE)]
+
+
+def test_where_joints_are_not_stiff_enough_for_an_exact_motion_a_softer_grip_is_judged(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    ways = Ways(firm=False)
+    assert refine(monkeypatch, ways, 1.0, ["feasible", "certified"], [0], stiffness=1.5) == (SOFT, 0)
+    assert ways.asked == [("solve", AMPLE), ("with_margin", SOFT)]
 
 
 def test_where_fingers_pass_through_each_other_no_other_grip_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
