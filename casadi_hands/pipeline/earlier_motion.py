@@ -40,7 +40,7 @@ def earlier_motion(hand: Hand, motion: Motion, old: Model, model: Model) -> Whol
         fingers.append(finger_from_si(hand.fingers[i], joints[at][:, own], length))
     path = [
         resting_spline(motion.time, motion.object_position)(when),
-        resting_spline(motion.time, _vectors(turns @ matrix(old.reference).T))(when),
+        resting_spline(motion.time, continuous_vectors(turns @ matrix(old.reference).T, old.goal_vectors[0]))(when),
     ]
     return WholeHand(
         fingers=tuple(fingers),
@@ -79,9 +79,9 @@ def in_columns(motion: Motion, model: Model, values: NDArray[Any]) -> NDArray[An
     return result
 
 
-def _vectors(rotations: Array) -> Array:
-    """Rotation vectors (S, 3) of rotations (S, 3, 3), continuous from one to the next."""
-    vectors = [np.zeros(3)]
+def continuous_vectors(rotations: Array, first: Array) -> Array:
+    """Rotation vectors (S, 3) of rotations (S, 3, 3), continuous from one to the next, and the first near (3,)."""
+    vectors = [first]
     for rotation in rotations:
         vectors.append(nearest_exponential(rotation, vectors[-1]))
     return np.array(vectors[1:])
@@ -90,7 +90,7 @@ def _vectors(rotations: Array) -> Array:
 def turns_at(time: Array, quaternions: Array, when: Array) -> Array:
     """Rotations (S, 3, 3) at other times, of something that starts and ends at rest."""
     turns = np.array([matrix(q) for q in quaternions])
-    vectors = resting_spline(time, _vectors(turns @ turns[0].T))(when)
+    vectors = resting_spline(time, continuous_vectors(turns @ turns[0].T, np.zeros(3)))(when)
     return np.array([pin.exp3(v) @ turns[0] for v in vectors])
 
 

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from casadi_hands.errors import SolveError
 from casadi_hands.export.design import Design
+from casadi_hands.pipeline.earlier_motion import continuous_vectors
 from casadi_hands.pipeline.margins import SMALL, Margins, margins_for
 from casadi_hands.pipeline.warm_start import as_floating, kept_margin, warm_start
 from casadi_hands.problem.hand_motion import WholeHand
@@ -337,3 +338,10 @@ def test_a_result_without_a_motion_is_refused() -> None:
     task = parse_task(HELD)
     with pytest.raises(SolveError, match="it holds no hand with a motion; solving without --from works"):
         warm_start(replace(earlier(), motion=None), task, build_model(task))
+
+
+def test_turns_of_more_than_a_round_stay_where_they_are_counted_from() -> None:
+    angles = np.radians(np.arange(-360, 361, 15))
+    turns = np.array([[[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]] for a in angles])
+    found = continuous_vectors(turns, np.array([0, 0, -2 * np.pi]))
+    np.testing.assert_allclose(found, np.outer(angles, [0, 0, 1]), atol=1e-9)
