@@ -152,8 +152,8 @@ def _touched(body: ManipulatedObject, point: np.ndarray) -> Body:
 
 
 def fingertips_fit(task: Task) -> bool:
-    """Whether balls of the links' radius fit at all contacts at the start: beside each other and above the ground."""
-    radius = task.hand.link_radius
+    """Whether fingertips fit at all contacts at the start: beside each other and above the ground."""
+    radius = task.fingertip.radius
     _, position, vector = task.goal_poses()[0]
     tips = []
     for finger in task.fingers.values():

@@ -165,7 +165,10 @@ def _links(task: Task) -> str:
     motors = f"motors of {motor.stiffness:g} N·m/rad, {'at most ' + ' and '.join(most) if most else 'without limits'}"
     if hand.drive.servo:
         motors = f"servos {hand.drive.servo}, {motors}"
-    sizes = f"radius {1e3 * hand.link_radius:.4g} mm, {low:.4g} to {high:.4g} mm long"
+    thick = f"radius {1e3 * hand.link_radius:.4g} mm"
+    if task.fingertip.radius > hand.link_radius:
+        thick += f", of the last {1e3 * task.fingertip.radius:.4g} mm"
+    sizes = f"{thick}, {low:.4g} to {high:.4g} mm long"
     return f"{sizes}; joints {lower:g} to {upper:g} deg; {motors}"
 
 

@@ -35,40 +35,50 @@ def fingertip_findings(task: Task, model: Model) -> Iterator[Finding]:
     depths = [_depth(task, model, turn, place, *touch) for touch in zip(points, normals, strict=True)]
     index = max(range(len(points)), key=lambda i: depths[i][0])
     (depth, where), name = depths[index], model.contact_names[index]
-    if depth > _ROOM * model.link_radius:
+    if depth > _ROOM * model.tip_radius:
         near = zip(*nearby(model, points[index]), strict=True)
-        free = any(_depth(task, model, turn, place, *touch)[0] < _ROOM * model.link_radius for touch in near)
+        free = any(_depth(task, model, turn, place, *touch)[0] < _ROOM * model.tip_radius for touch in near)
         what = (
-            f"the fingertip of '{name}', {mm(model, model.link_radius)} in radius (hand.link_radius), is "
+            f"the fingertip of '{name}', {mm(model, model.tip_radius)} in radius ({_field(model)}), is "
             f"{mm(model, depth)} inside {where} at the start, where it touches the object (fingers.{name}.touches)"
         )
-        advice = "a contact with room for a fingertip, or thinner links (hand.link_radius)"
+        advice = f"a contact with room for a fingertip, or thinner {_what(model)} ({_field(model)})"
         yield found(what, advice, certain=not free)
     if not task.palm.may_move:
         yield from _around(model, turn, normals)
 
 
+def _field(model: Model) -> str:
+    """The task's field that makes fingertips as thick as they are."""
+    return "fingertip.radius" if model.tip_radius > model.link_radius else "hand.link_radius"
+
+
+def _what(model: Model) -> str:
+    """What is as thick as a fingertip."""
+    return "fingertips" if model.tip_radius > model.link_radius else "links"
+
+
 def _in_each_other(model: Model, points: Array, normals: Array) -> Iterator[Finding]:
     """Two fingertips at their contacts (C, 3) are in each other; of several pairs the closest."""
-    tips = points + model.link_radius * normals
+    tips = points + model.tip_radius * normals
     pairs = [(float(np.linalg.norm(tips[i] - tips[j])), i, j) for i, j in combinations(range(len(tips)), 2)]
-    wide = 2 * model.link_radius
+    wide = 2 * model.tip_radius
     if not pairs or min(pairs)[0] >= wide:
         return
     apart, i, j = min(pairs)
     first, second = model.contact_names[i], model.contact_names[j]
     what = (
         f"the fingertips of '{first}' and '{second}' overlap by {mm(model, wide - apart)} where they touch the object "
-        f"(fingers.{second}.touches): their centres are {mm(model, apart)} apart, and links are {mm(model, wide)} "
-        "thick (2 × hand.link_radius)"
+        f"(fingers.{second}.touches): their centres are {mm(model, apart)} apart, and {_what(model)} are "
+        f"{mm(model, wide)} thick (2 × {_field(model)})"
     )
     radius = 0.49 * float(np.linalg.norm(points[i] - points[j])) * model.units.length
-    yield found(what, f"contacts farther apart, or hand.link_radius below {radius:.3g}", certain=apart < _APART * wide)
+    yield found(what, f"contacts farther apart, or {_field(model)} below {radius:.3g}", certain=apart < _APART * wide)
 
 
 def _depth(task: Task, model: Model, turn: Array, place: Array, point: Array, normal: Array) -> tuple[float, str]:
     """How deep a fingertip at a contact is in what it must not be in, lengths, and what that is."""
-    radius = model.link_radius
+    radius = model.tip_radius
     center = point + radius * normal
     depths = [(radius - min(body.signed_distance(center) for body in model.bodies), "the object")]
     world = place + turn @ center

@@ -78,7 +78,7 @@ def _towards(model: Model, time: float, place: Array) -> str:
 def _reach(task: Task, model: Model) -> tuple[float, str]:
     """Lengths that a finger reaches from its first joint, and a clause that says of what."""
     joints, longest = task.search.max_joints, model.link_length[1]
-    return joints * longest + model.link_radius, f"a finger of {joints} links of at most {mm(model, longest)} each"
+    return joints * longest + model.tip_radius, f"a finger of {joints} links of at most {mm(model, longest)} each"
 
 
 _NEARER = "a palm nearer by (palm.position), longer links (hand.link_length) or more of them (search.max_joints)"
@@ -109,10 +109,11 @@ def _touches_beyond_reach(task: Task, model: Model) -> Iterator[Finding]:
     if task.draws:
         return
     length, finger = _reach(task, model)
+    standing = model.radii(task.search.max_joints)[0]
     time, turn, place = next(iter(_in_palm(task, model)))
     for name, point in zip(model.contact_names, model.patches, strict=False):
         x, y, z = place + turn @ point
-        distance = float(np.hypot(np.hypot(x, y) - model.palm_radius, z - STAND * model.link_radius))
+        distance = float(np.hypot(np.hypot(x, y) - model.palm_radius, z - STAND * standing))
         nearest = min(body.signed_distance(-turn.T @ place) for body in model.bodies)
         if distance > length and nearest <= model.palm_radius + length:
             what = (

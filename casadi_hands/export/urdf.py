@@ -140,16 +140,23 @@ def _add_finger(robot: Element, hand: Hand, i: int, finger: Finger, inertials: M
         _add_inertial(body, inertials[name])
         _add_solid(body, link.solid, finger_color(i), joint_color(i))
         if link.hinge:
-            _add_hinge(body, link, joint_color(i))
+            _add_hinge(body, link, finger.links[max(j - 1, 0)].radius, joint_color(i))
         parent, origin = name, np.array([0.0, 0.0, link.length])
 
 
-def _add_hinge(body: Element, link: Link, color: Color) -> None:
-    """Add a link's tongue, up to its joint, and the pin that it turns on: looked at, but in the body before."""
-    axis = 1.2 * link.radius * np.asarray(link.axis)
+def _add_hinge(body: Element, link: Link, size: float, color: Color) -> None:
+    """Add a link's tongue, up to its joint, and the pin that it turns on: looked at, but in the body before.
+
+    Args:
+        body: the link's element.
+        link: whose hinge it is.
+        size: radius of the body before, m.
+        color: of the tongue.
+    """
+    axis = 1.2 * size * np.asarray(link.axis)
     for start, end, radius, shown in (
-        (np.zeros(3), link.solid.start, 0.6 * link.radius, color),
-        (-axis, axis, 0.25 * link.radius, PIN_COLOR),
+        (np.zeros(3), link.solid.start, 0.6 * size, color),
+        (-axis, axis, 0.25 * size, PIN_COLOR),
     ):
         along, length = end - start, float(np.linalg.norm(end - start))
         _add_shape(body, "visual", _cylinder(radius, length), (start + end) / 2, _pointing(along), shown)

@@ -4,13 +4,20 @@ from __future__ import annotations
 
 from functools import lru_cache
 from importlib import import_module
+from typing import TypeVar
 
 import casadi
 
 from casadi_hands.errors import KinematicsError
 
+Length = TypeVar("Length")
 STAND = 1.05
-"""Height of a finger's first joint above the palm's face, in link radii: the joint's ball turns clear of the face."""
+"""Height of a finger's first joint above the palm's face, in its link's radii: the joint's ball turns clear of it."""
+
+
+def link_radii(joints: int, radius: Length, tip: Length) -> list[Length]:
+    """Radii of a finger's links, from the palm outwards: the last, which touches the object, has the fingertip's."""
+    return [*[radius] * (joints - 1), tip]
 
 
 @lru_cache

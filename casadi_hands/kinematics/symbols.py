@@ -18,7 +18,7 @@ class FingerSymbols:
     """One finger in a kernel, palm frame.
 
     Attributes:
-        base: (2,) of the first joint, which stands ``STAND`` link radii above the palm's face.
+        base: (2,) of the first joint, which stands ``STAND`` radii of its link above the palm's face.
         lengths: (n,).
         axes: (3, n) unit joint axes, frames of their links.
         turns: (3, 3n) rotations of links at zero angle, parent <- link: their bends.
@@ -35,7 +35,13 @@ class FingerSymbols:
         return int(self.lengths.numel())
 
     def placed(self, angles: SX, radius: SX, point: SX | None = None) -> PlacedFinger:
-        """The finger at joint angles (n,), with links of a radius and a contact point (3,) in the last link's frame."""
+        """The finger at joint angles (n,).
+
+        Args:
+            angles: (n,) rad.
+            radius: of its first link, above which ``STAND`` tells where it stands.
+            point: (3,) its contact, in the last link's frame.
+        """
         function = finger_kinematics(self.joints)
         at = SX.zeros(3, 1) if point is None else point
         base = ca.vertcat(self.base, STAND * radius)

@@ -68,7 +68,10 @@ def warm_start(earlier: Design, task: Task, model: Model) -> WholeHand:
     on_link = in_columns(motion, model, motion.contact_point_link) / model.units.length
     on_link = np.tensordot(linear(motion.time, old.schedule.real(stretched(old, model))), on_link, axes=1)
     stood = {finger.name: finger.base[2] / model.units.length for finger in earlier.hand.fingers}
-    rises = [STAND * model.link_radius - stood[model.contact_names[c]] for c in was.contacts]
+    rises = [
+        STAND * model.radii(finger.joints)[0] - stood[model.contact_names[c]]
+        for c, finger in zip(was.contacts, was.fingers, strict=True)
+    ]
     return _followed(was, _moved(was, task, old, model), on_link, rises, old, model)
 
 

@@ -106,7 +106,7 @@ def propose(task: Task) -> Proposal:
         raise SolveError("all contacts are given; there are none to place; see `touches` in casadi-hands fields")
     model = build_model(task)
     rng = np.random.default_rng((task.search.seed, _STREAM))
-    drawn = spots(model.bodies, model.link_radius, CANDIDATES, rng)
+    drawn = spots(model.bodies, model.tip_radius, CANDIDATES, rng)
     candidates, given = _touchable(task, model, drawn)
     allowed = {name: _allowed(task, model, finger, candidates) for name, finger in task.fingers.items()}
     allowed |= {name: np.array([len(candidates) + k]) for k, name in enumerate(given)}
@@ -191,15 +191,15 @@ def _sets(task: Task, model: Model, on: Spots, names: tuple[str, ...], choices: 
     """The best sets that differ, for some of the fingers."""
     view = seen(model, on, task.palm.may_move)
     contacts = Contacts.of(on.points, on.normals, task.friction, model.torsion)
-    shapes = shape_operators(model.bodies, on, contacts.frames, STEP * model.link_radius)
+    shapes = shape_operators(model.bodies, on, contacts.frames, STEP * model.tip_radius)
     needed = loads(model)
     # Where a surface is curved contacts roll far for a small turn, and forces with them.
-    cost = view.cost + BENT * model.link_radius * np.trace(shapes, axis1=1, axis2=2) / 2
+    cost = view.cost + BENT * model.tip_radius * np.trace(shapes, axis1=1, axis2=2) / 2
 
     def wobble(chosen: Index, grip: Grip) -> float:
         """Stiffness asked for at the worst load, by that of a fingertip a palm radius from its joint."""
         asked = [
-            needed_stiffness(on.points, contacts, chosen, shapes, model.link_radius, forces) for forces in grip.forces
+            needed_stiffness(on.points, contacts, chosen, shapes, model.tip_radius, forces) for forces in grip.forces
         ]
         return max(asked) * model.palm_radius**2 / model.stiffness
 
@@ -208,7 +208,7 @@ def _sets(task: Task, model: Model, on: Spots, names: tuple[str, ...], choices: 
     for level, disturbed in _LEVELS:
         rng = np.random.default_rng((task.search.seed, _STREAM, len(names)))
         bounds = Bounds(contacts, needed, disturbed, rng)
-        better = rank(on, choices, cost, bounds, wobble, model.link_radius, SETS, rng)
+        better = rank(on, choices, cost, bounds, wobble, model.tip_radius, SETS, rng)
         if better and (not ranked or better[0].grip < _EASIER * ranked[0].grip):
             ranked, words = better, level
         # Without disturbances only where nothing withstands any: the ground alone may bear the weight.

@@ -78,7 +78,7 @@ def seen(model: Model, on: Spots, palm_moves: bool) -> Seen:
         on: the points.
         palm_moves: whether the program may move the palm, which then follows the object; what counts is the start.
     """
-    radius = model.link_radius
+    radius = model.tip_radius
     angles, heights, places = [], [], []
     for pose in poses(model)[: 1 if palm_moves else None]:
         rotation, position = palm_from_world(model, pose.time)

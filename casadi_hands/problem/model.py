@@ -9,6 +9,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from casadi_hands.geometry.bodies import Body
+from casadi_hands.kinematics import link_radii
 from casadi_hands.motion import Schedule, zero_order_hold
 from casadi_hands.problem.attachment import Attachment
 from casadi_hands.problem.contacts import Contact
@@ -49,11 +50,13 @@ class Model:
         scenarios: the motion as planned, and if the task disturbs it, the same with what does.
         exerted: what the object must exert on the world, whose answer is in all scenarios.
         attachment: the joint that holds the object to the world, or None of a free one.
-        link_radius: of all links.
+        link_radius: of all links but a finger's last.
+        tip_radius: of a finger's last link, which touches the object.
         bend: largest of a link at zero angle, rad.
         axis_cosines: least and largest cosine of a joint's axis and the links beside it.
-        hinge: from a joint to where the body of its link begins; 0 where links begin in a ball that they share.
+        hinge: from the last joint to where the body of its link begins; 0 where links begin in a ball that they share.
         link_length: shortest and longest link.
+        shortest_last: a finger's last link, which may have a longer hinge than others.
         joint_limits: lower and upper, rad.
         torque_limit: of a motor in m·g·length, or inf.
         speed_limit: of a motor in rad/s, or inf.
@@ -89,10 +92,12 @@ class Model:
     tool: Array | None
     scenarios: tuple[Scenario, ...]
     link_radius: float
+    tip_radius: float
     bend: float
     axis_cosines: tuple[float, float]
     hinge: float
     link_length: tuple[float, float]
+    shortest_last: float
     joint_limits: tuple[float, float]
     torque_limit: float
     speed_limit: float
@@ -108,6 +113,14 @@ class Model:
     motors: int = 0
     ratios: tuple[float, float] = (0.1, 2.0)
     own_terms: tuple[OwnTerm, ...] = ()
+
+    def radii(self, joints: int) -> list[float]:
+        """Of the links of a finger with some joints, lengths."""
+        return link_radii(joints, self.link_radius, self.tip_radius)
+
+    def least_lengths(self, joints: int) -> Array:
+        """(n,) shortest that the links of a finger with some joints may be, lengths."""
+        return np.array([*[self.link_length[0]] * (joints - 1), self.shortest_last])
 
     @property
     def joint_torque_limit(self) -> float:

@@ -69,8 +69,8 @@ def _at_samples(model: Model, result: WholeHand) -> Motion:
     links = ["none"] * model.contacts + (["ground"] if model.ground is not None else [])
     for i, (finger, contact) in enumerate(zip(result.fingers, result.contacts, strict=True)):
         links[contact] = f"finger{i}_link{finger.joints - 1}"
-        link = Capsule(np.array([0, 0, model.hinge]), np.array([0, 0, finger.lengths[-1]]), model.link_radius)
-        origins, rotations = link_frames(finger, model.link_radius, result.angles[i])
+        link = Capsule(np.array([0, 0, model.hinge]), np.array([0, 0, finger.lengths[-1]]), model.tip_radius)
+        origins, rotations = link_frames(finger, model.radii(finger.joints), result.angles[i])
         from_origin = in_palm(model, result, point[:, contact]) - origins[:, -1]
         local = np.einsum("sji,sj->si", rotations[:, -1], from_origin)
         on_link[:, contact] = on_bodies(local, [link] * count)

@@ -52,7 +52,7 @@ def contact_jacobians(model: Model, motion: WholeHand, finger: int) -> Array:
         finger: index of the finger among the motion's.
     """
     own = motion.fingers[finger]
-    origins, rotations = link_frames(own, model.link_radius, motion.angles[finger])
+    origins, rotations = link_frames(own, model.radii(own.joints), motion.angles[finger])
     axes = np.einsum("kjab,jb->kja", rotations, own.axis_vectors)
     contact = in_palm(model, motion, motion.point[:, motion.contacts[finger]])
     return np.ascontiguousarray(np.cross(axes, contact[:, None] - origins).transpose(0, 2, 1))
@@ -68,7 +68,7 @@ def joint_torques(model: Model, motion: WholeHand) -> Array:
             normals = rounded_normals(motion.point[:, contact], model.touched[contact])
             moment = model.torsion * motion.torsion[:, contact, None] * normals
             moment = turned_to_palm(motion, turned_to_world(model, motion, moment))
-            _, rotations = link_frames(finger, model.link_radius, motion.angles[i])
+            _, rotations = link_frames(finger, model.radii(finger.joints), motion.angles[i])
             torque += np.einsum("sjab,jb,sa->sj", rotations, finger.axis_vectors, moment)
         found.append(torque)
     return np.hstack(found)
@@ -105,9 +105,8 @@ def contact_slips(model: Model, motion: WholeHand, finger: int) -> Array:
         motion: of the samples.
         finger: index of the finger among the motion's.
     """
-    origins, links = (
-        each[:, -1] for each in link_frames(motion.fingers[finger], model.link_radius, motion.angles[finger])
-    )
+    own = motion.fingers[finger]
+    origins, links = (each[:, -1] for each in link_frames(own, model.radii(own.joints), motion.angles[finger]))
     points = motion.point[:, motion.contacts[finger]]
     on_link = np.einsum("sba,sb->sa", links, in_palm(model, motion, points) - origins)
     palms = np.array([pin.Quaternion(*q).matrix() for q in motion.palm_quaternion])
@@ -127,7 +126,8 @@ def contact_spins(model: Model, motion: WholeHand, finger: int, normals: Array) 
         finger: index of the finger among the motion's.
         normals: (S, 3) about which, object frame.
     """
-    _, rotations = link_frames(motion.fingers[finger], model.link_radius, motion.angles[finger])
+    own = motion.fingers[finger]
+    _, rotations = link_frames(own, model.radii(own.joints), motion.angles[finger])
     palms = np.array([pin.Quaternion(*q).matrix() for q in motion.palm_quaternion])
     turns = np.array([object_rotation(model, v) for v in motion.vector])
     relative = np.einsum("sba,scb,scd->sad", rotations[:, -1], palms, turns)

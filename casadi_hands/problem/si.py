@@ -88,8 +88,10 @@ def build_model(task: Task, whole: bool = False) -> Model:
         scenarios=scenarios_of(task, schedule, units),
         exerted=exerted_of(task, units),
         link_radius=round_off(task.hand.link_radius / length),
-        hinge=round_off(task.hand.hinge_length / length),
+        tip_radius=round_off(task.fingertip.radius / length),
+        hinge=round_off(task.last_hinge / length),
         link_length=(round_off(task.hand.link_length[0] / length), round_off(task.hand.link_length[1] / length)),
+        shortest_last=round_off(task.shortest_last / length),
         joint_limits=(math.radians(low), math.radians(high)),
         bend=math.radians(task.hand.bend),
         axis_cosines=_cosines(task.hand.axes.from_link),
@@ -173,17 +175,21 @@ def hand_of(
     length = model.units.length
     built = []
     for finger, contact in zip(fingers, contacts, strict=True):
+        radii = model.radii(finger.joints)
+        hinges = [task.hand.hinge_length] * (finger.joints - 1) + [task.last_hinge]
         links = tuple(
             Link(
                 float(part * length),
-                model.link_radius * length,
+                radius * length,
                 _triple(a / np.linalg.norm(a)),
                 (b[0], b[1]),
-                task.hand.hinge_length,
+                hinge,
             )
-            for part, a, b in zip(finger.lengths, finger.axis_vectors, finger.bends.tolist(), strict=True)
+            for part, radius, a, b, hinge in zip(
+                finger.lengths, radii, finger.axis_vectors, finger.bends.tolist(), hinges, strict=True
+            )
         )
-        base = _triple(np.append(finger.base, STAND * model.link_radius) * length)
+        base = _triple(np.append(finger.base, STAND * radii[0]) * length)
         built.append(Finger(model.contact_names[contact], base, links))
     # A motor that joints share has other limits than they.
     named = (None, None) if model.motors else (task.actuator.torque, task.actuator.speed)

@@ -82,6 +82,7 @@ RANGES = {
     "hand.link_length": _SIZE,
     "hand.hinge_length": _SIZE,
     "hand.clearance": Range(0.0, 1e5, "m"),
+    "fingertip.radius": _SIZE,
     "fingertip.torsion": Range(0.0, 1e5, "m"),
     "at": Range(0.0, 1e6, "s"),
     "perturbations.from": Range(0.0, 1e6, "s"),

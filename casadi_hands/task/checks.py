@@ -33,7 +33,7 @@ def check(task: Task) -> list[Problem]:
     # Where things stand at the goals says nothing while the goals themselves are in doubt.
     places = [] if timing else list(_turns(task)) + list(_object_places(task)) + list(_palm_places(task))
     places += list(_keep_out(task))
-    return timing + places + list(_contacts(task)) + list(_object_points(task))
+    return timing + places + list(_contacts(task)) + list(_object_points(task)) + list(_fingertips(task))
 
 
 def _goal_times(task: Task) -> Iterator[Problem]:
@@ -198,6 +198,21 @@ def _region(task: Task, name: str, region: Region) -> Iterator[Problem]:
         if distance > region.within:
             allowed = f"at least {distance:.3g} m, at which the object's surface is from {list(region.near)}"
             yield Problem((*path, "within"), f"{region.within:g}", allowed)
+
+
+def _fingertips(task: Task) -> Iterator[Problem]:
+    """Sizes of fingertips beside those of the links behind them."""
+    radius, hand, path = task.fingertip.radius, task.hand, ("fingertip", "radius")
+    if radius < hand.link_radius * (1 - 1e-9):
+        allowed = f"at least hand.link_radius ({hand.link_radius:.4g}), that of the links behind it"
+        yield Problem(path, f"{radius:g}", allowed)
+    elif task.shortest_last > hand.link_length[1] * (1 + 1e-9):
+        most = hand.link_radius * (1 + (hand.link_length[1] - hand.link_length[0]) / hand.hinge_length)
+        allowed = (
+            f"at most {most:.4g}, or longer links (hand.link_length): with its hinge the last link is at least "
+            f"{task.shortest_last:.4g} long, and links are at most {hand.link_length[1]:.4g}"
+        )
+        yield Problem(path, f"{radius:g}", allowed)
 
 
 def _object_points(task: Task) -> Iterator[Problem]:

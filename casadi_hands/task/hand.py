@@ -139,10 +139,16 @@ def rubber_torsion(friction: float, radius: float) -> float:
 class Fingertip(Section):
     """What the fingers touch with."""
 
+    radius: Positive = Field(
+        description="Radius of every finger's last link, which touches the object, m; at least hand.link_radius. Its "
+        "hinge is as much longer as it is thicker, hand.hinge_length × this / hand.link_radius, and so is the "
+        "shortest that it may be. Larger tips ask for less stiff joints.",
+        json_schema_extra={"default": "hand.link_radius"},
+    )
     torsion: NonNegative = Field(
         description="Radius of the torsional friction, m: a contact resists a twist about its normal by at most this "
         "times its normal force. 0 is a hard point.",
-        json_schema_extra={"default": "0.2 × friction × hand.link_radius, of a rubber tip"},
+        json_schema_extra={"default": "0.2 × friction × fingertip.radius, of a rubber tip"},
     )
 
 
@@ -167,7 +173,7 @@ class HandSpec(Section):
     """What fingers can be built."""
 
     link_radius: Positive = Field(
-        description="Radius of every link, m.",
+        description="Radius of links, m; of a finger's last one `fingertip.radius`.",
         json_schema_extra={
             "default": "0.13 × palm.radius; more where a straight finger would bend by over 2 % of the object's "
             "characteristic length under what a fingertip may press with, as far as contacts leave room"

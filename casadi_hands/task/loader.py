@@ -125,7 +125,7 @@ def _stood(task: Task, file: TaskFile | TaskData) -> dict[str, Any]:
     hand = file.data.get("hand")
     # The usual length of links follows from the palm's place.
     fixed = isinstance(hand, dict) and "link_length" in hand
-    reach = task.search.max_joints * task.hand.link_length[1] + task.hand.link_radius
+    reach = task.search.max_joints * task.hand.link_length[1] + task.fingertip.radius
     palm = stand(task, given.get("facing") is not None, reach if fixed else math.inf)
     if isinstance(palm, Problem):
         raise _refusal([palm], file)

@@ -93,7 +93,7 @@ def places(task: Task, faces: bool, contacts: Touched, at: tuple[Array, Array]) 
     """
     palm, radius = task.palm, task.palm.radius
     step = 10.0 ** (math.floor(math.log10(radius)) - 2)
-    tips = contacts.tips(at, task.hand.link_radius)
+    tips = contacts.tips(at, task.fingertip.radius)
     middle = tips.reshape(-1, 3).mean(axis=0)
     angles = 2 * np.pi * np.arange(AROUND) / AROUND
     ring = np.column_stack([np.cos(angles), np.sin(angles)])
@@ -127,7 +127,7 @@ def _is_clear(task: Task, palm: Palm, contacts: Touched, at: tuple[Array, Array]
     if any(box.distance_from_palm(position, rotation, palm.radius, palm.thickness) < width for box in task.keep_out):
         return False
     if np.isfinite(reach):
-        tips = (contacts.tips(at, task.hand.link_radius) - position) @ rotation
+        tips = (contacts.tips(at, task.fingertip.radius) - position) @ rotation
         from_rim = np.asarray(np.hypot(np.linalg.norm(tips[..., :2], axis=-1) - palm.radius, tips[..., 2]))
         if contacts.of_groups(np.asarray(from_rim.max(axis=0), float)).max() > reach:
             return False
@@ -138,7 +138,7 @@ def _is_clear(task: Task, palm: Palm, contacts: Touched, at: tuple[Array, Array]
 def _ways_are_free(task: Task, palm: Palm, contacts: Touched, at: tuple[Array, Array]) -> bool:
     """Whether straight ways from the palm's rim to fingertips are free of boxes and ground; of a region's, to half."""
     radius, position, rotation = task.hand.link_radius, np.array(palm.position), palm.rotation
-    tips = contacts.tips(at, radius)
+    tips = contacts.tips(at, task.fingertip.radius)
     local = (tips - position) @ rotation
     across = np.linalg.norm(local[..., :2], axis=-1, keepdims=True)
     rim = np.concatenate([palm.radius * local[..., :2] / np.maximum(across, 1e-9), 0 * across], axis=-1)

@@ -102,7 +102,7 @@ def cost_of(task: Task, contacts: Touched, at: tuple[Array, Array], positions: A
     A contact costs one that is 48° off side-on to the palm all the time, and 0.3 at a palm radius more or less than two
     from it, both squared; fingertips that hide each other from the palm cost more, and so does a palm from below.
     """
-    tip = task.hand.link_radius
+    tip = task.fingertip.radius
     tips = contacts.tips(at, tip)
     off_side, distance = off_side_and_distance(task, contacts, at, positions, rotation)
     each = ((off_side / SIDE_ON) ** 2).mean(axis=0) + FAR * ((distance - USUAL) ** 2).mean(axis=1)
@@ -120,7 +120,7 @@ def off_side_and_distance(
     task: Task, contacts: Touched, at: tuple[Array, Array], positions: Array, rotation: Array
 ) -> tuple[Array, Array]:
     """How far contacts (K, N) are from side-on to the palm, rad, and fingertips (P, K, N) from its disc, palm radii."""
-    tips = contacts.tips(at, task.hand.link_radius)
+    tips = contacts.tips(at, task.fingertip.radius)
     normals = contacts.normals @ at[0].transpose(0, 2, 1)
     off_side = np.arcsin(np.clip(np.abs(normals @ rotation[:, 2]), 0, 1))
     local = (tips[None] - positions[:, None, None]) @ rotation

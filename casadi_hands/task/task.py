@@ -180,7 +180,9 @@ class Task(Section):
     @classmethod
     def _fingertip_defaults(cls, value: Any, info: ValidationInfo) -> Any:
         hand, friction = info.data.get("hand"), info.data.get("friction", 1.0)
-        return fill(value, torsion=rubber_torsion(friction, hand.link_radius if hand else 1.0))
+        value = fill(value, radius=hand.link_radius if hand else 1.0)
+        radius = value.get("radius") if isinstance(value, dict) else None
+        return fill(value, torsion=rubber_torsion(friction, radius) if isinstance(radius, float | int) else 0.0)
 
     @field_validator("limits", mode="before")
     @classmethod
@@ -236,6 +238,16 @@ class Task(Section):
     def is_placed(self) -> bool:
         """Whether every finger has a point to touch; else `solve` places contacts first."""
         return all(finger.is_placed for finger in self.fingers.values())
+
+    @property
+    def last_hinge(self) -> float:
+        """From the last joint of a finger to where its link's body begins, m: longer where the fingertip is thicker."""
+        return self.hand.hinge_length * (self.fingertip.radius / self.hand.link_radius)
+
+    @property
+    def shortest_last(self) -> float:
+        """The shortest that a finger's last link may be, m: with as long a body as the shortest of the others."""
+        return self.hand.link_length[0] + (self.last_hinge - self.hand.hinge_length)
 
     @property
     def force_unit(self) -> float:

@@ -61,6 +61,7 @@ def doubtful_units(task: Task) -> Iterator[Question]:
     for path, length, most in (
         (("palm", "radius"), palm.radius, usual),
         (("hand", "link_radius"), hand.link_radius, max(usual, palm.radius)),
+        (("fingertip", "radius"), task.fingertip.radius, max(usual, palm.radius)),
         (("hand", "link_length"), hand.link_length[1], usual + 2 * palm.radius),
     ):
         if length > most:

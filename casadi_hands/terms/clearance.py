@@ -19,6 +19,8 @@ _ROUNDING = 1e-3  # half the width of the spline's transition, lengths
 FOLD = -0.3
 """Cosine of the sharpest turn from a link to the next: there the next one's body, `SHORTEST_HINGE` off, is clear."""
 _CROSSING = 1e-4  # value of distances that vanish, lengths
+Links = tuple[list[tuple[SX, SX]], Sequence[SX]]
+"""A finger's links: both ends (3,) of each one's axis, and its radius."""
 
 COLLISION = Term(
     "collision",
@@ -38,52 +40,66 @@ def overlap(depth: SX) -> SX:
     return penalty_spline(depth, _ROUNDING)
 
 
-def links_and_object(ends: list[tuple[SX, SX]], radius: SX, bodies: Sequence[Surface]) -> SX:
+def links_and_object(ends: list[tuple[SX, SX]], radii: Sequence[SX], bodies: Sequence[Surface]) -> SX:
     """Distances (L·K,) between the surfaces of a finger's links and the object's bodies.
 
     Args:
         ends: both ends (3,) of each link's axis.
-        radius: of the links.
+        radii: of the links.
         bodies: whose union the object is.
     """
     return ca.vertcat(
         *[
             core_distance(Segment(start, end), body.core) - radius - body.radius
-            for start, end in ends
+            for (start, end), radius in zip(ends, radii, strict=True)
             for body in bodies
         ]
     )
 
 
-def links_and_palm(ends: list[tuple[SX, SX]], radius: SX, palm_radius: SX) -> SX:
-    """Distances of links from the palm: the first by its far end, the others by both ends and the middle."""
-    points = [ends[0][1]]
-    for start, end in ends[1:]:
-        points += [(start + end) / 2, end]
-    return ca.vertcat(*[point_disc_distance(point, palm_radius) - radius for point in points])
+def links_and_palm(ends: list[tuple[SX, SX]], radii: Sequence[SX], palm_radius: SX) -> SX:
+    """Distances of links from the palm: the first by its far end, the others by both ends and the middle.
+
+    Where two links meet, the farther one's radius counts: none is thinner than the one before.
+    """
+    meeting = [*radii[1:], radii[-1]]
+    points = [(ends[0][1], meeting[0])]
+    for j, (start, end) in enumerate(ends[1:], start=1):
+        points += [((start + end) / 2, radii[j]), (end, meeting[j])]
+    return ca.vertcat(*[point_disc_distance(point, palm_radius) - radius for point, radius in points])
 
 
-def links_and_ground(ends: list[tuple[SX, SX]], radius: SX, up: SX, height: SX) -> SX:
-    """Heights (L + 1,) of links above the ground, whose normal is ``up`` and whose points p have up·p = height."""
+def links_and_ground(ends: list[tuple[SX, SX]], radii: Sequence[SX], up: SX, height: SX) -> SX:
+    """Heights (L + 1,) of links above the ground, whose normal is ``up`` and whose points p have up·p = height.
+
+    Where two links meet, the farther one's radius counts: none is thinner than the one before.
+    """
     points = [ends[0][0], *[end for _, end in ends]]
-    return ca.vertcat(*[ca.dot(up, point) - height - radius for point in points])
+    pairs = zip(points, [*radii, radii[-1]], strict=True)
+    return ca.vertcat(*[ca.dot(up, point) - height - radius for point, radius in pairs])
 
 
-def links_and_links(ends: list[tuple[SX, SX]], others: list[tuple[SX, SX]], radius: SX) -> SX:
-    """Distances (L·M,) between the links of two fingers of one link radius."""
-    return ca.vertcat(*[segment_distance(*a, *b) - 2 * radius for a in ends for b in others])
+def links_and_links(links: Links, others: Links) -> SX:
+    """Distances (L·M,) between the links of two fingers."""
+    return ca.vertcat(*[_links_apart(a, b) for a in zip(*links, strict=True) for b in zip(*others, strict=True)])
 
 
-def two_fingers(ends: list[tuple[SX, SX]], others: list[tuple[SX, SX]], radius: SX, servo: SX | None = None) -> SX:
+def two_fingers(links: Links, others: Links, servo: SX | None = None) -> SX:
     """Distances between two fingers: of their links and, where joints hold servos in balls of a radius, of those."""
-    links = links_and_links(ends, others, radius)
-    return links if servo is None else ca.vertcat(links, servos_and_finger(ends, others, radius, servo))
+    apart = links_and_links(links, others)
+    return apart if servo is None else ca.vertcat(apart, servos_and_finger(links, others, servo))
 
 
-def links_of_one(ends: list[tuple[SX, SX]], radius: SX) -> SX:
+def links_of_one(ends: list[tuple[SX, SX]], radii: Sequence[SX]) -> SX:
     """Distances between links of one finger that are not neighbours."""
-    pairs = [(ends[i], ends[j]) for i in range(len(ends)) for j in range(i + 2, len(ends))]
-    return ca.vertcat(SX.zeros(0, 1), *[segment_distance(*a, *b) - 2 * radius for a, b in pairs])
+    links = list(zip(ends, radii, strict=True))
+    pairs = [(links[i], links[j]) for i in range(len(links)) for j in range(i + 2, len(links))]
+    return ca.vertcat(SX.zeros(0, 1), *[_links_apart(a, b) for a, b in pairs])
+
+
+def _links_apart(link: tuple[tuple[SX, SX], SX], other: tuple[tuple[SX, SX], SX]) -> SX:
+    """Distance between two links, each its ends and its radius."""
+    return segment_distance(*link[0], *other[0]) - (link[1] + other[1])
 
 
 def unfolded(ends: list[tuple[SX, SX]], radius: SX) -> SX:
@@ -97,7 +113,7 @@ def unfolded(ends: list[tuple[SX, SX]], radius: SX) -> SX:
 
 def servos_and_rest(
     ends: list[tuple[SX, SX]],
-    radius: SX,
+    radii: Sequence[SX],
     servo: SX,
     palm_radius: SX,
     bodies: Sequence[Surface],
@@ -111,7 +127,7 @@ def servos_and_rest(
 
     Args:
         ends: both ends (3,) of each link's axis.
-        radius: of the links.
+        radii: of the links.
         servo: radius of the ball about a joint that holds its servo.
         palm_radius: of the disc.
         bodies: whose union the object is.
@@ -121,16 +137,21 @@ def servos_and_rest(
     found = [body.distance_and_normal(at, _CROSSING)[0] - servo for at, _ in ends for body in bodies]
     found += [point_disc_distance(at, palm_radius) - servo for at, _ in ends[1:]]
     for j, (at, _) in enumerate(ends):
-        links = [link for i, link in enumerate(ends) if i not in (j - 1, j)]
-        found += [point_segment_distance(*link, at) - radius - servo for link in links]
+        links = [link for i, link in enumerate(zip(ends, radii, strict=True)) if i not in (j - 1, j)]
+        found += [point_segment_distance(*link, at) - radius - servo for link, radius in links]
         found += [norm(at - there, _CROSSING) - 2 * servo for there, _ in ends[j + 2 :]]
     if up is not None:
         found += [ca.dot(up, at) - height - servo for at, _ in ends]
     return ca.vertcat(*found)
 
 
-def servos_and_finger(ends: list[tuple[SX, SX]], others: list[tuple[SX, SX]], radius: SX, servo: SX) -> SX:
+def servos_and_finger(links: Links, others: Links, servo: SX) -> SX:
     """Distances between servos of two fingers, and of each one's from the other one's links."""
-    links = [point_segment_distance(*link, at) - radius - servo for at, _ in ends for link in others]
-    links += [point_segment_distance(*link, at) - radius - servo for at, _ in others for link in ends]
-    return ca.vertcat(*links, *[norm(at - there, _CROSSING) - 2 * servo for at, _ in ends for there, _ in others])
+    apart = [
+        point_segment_distance(*link, at) - radius - servo
+        for one, other in ((links, others), (others, links))
+        for at, _ in one[0]
+        for link, radius in zip(*other, strict=True)
+    ]
+    between = [norm(at - there, _CROSSING) - 2 * servo for at, _ in links[0] for there, _ in others[0]]
+    return ca.vertcat(*apart, *between)

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from casadi_hands.kinematics.numeric import contact_kinematics
 from casadi_hands.kinematics.symbols import axes_of, axis, bend_rotation, cosines_from_links, tip_point, turns_of
-from tests.stages.example import PinFinger, everything, made_up_finger, project
+from tests.stages.example import PinFinger, everything, made_up_finger, project, sizes_of, with_tips
 
 LENGTH, RADIUS = 0.7, 0.2
 
@@ -101,21 +101,21 @@ def test_derivatives_are_finite_at_the_pole_and_at_the_seed_axis() -> None:
 
 @pytest.mark.parametrize("joints", [1, 2, 3])
 def test_contact_kinematics_in_numbers(joints: int) -> None:
-    _, model = everything()
+    model = with_tips(everything()[1])
     seed = made_up_finger(model, joints, 2, 5)
     strings = np.arange(len(seed.angles)) % 2
-    points, jacobians = contact_kinematics(seed, strings, model.link_radius)
-    finger = PinFinger(seed, model.link_radius)
+    points, jacobians = contact_kinematics(seed, strings, sizes_of(model, joints))
+    finger = PinFinger(seed, sizes_of(model, joints)[0])
     for k, (angles, string) in enumerate(zip(seed.angles, strings, strict=True)):
         u, v = seed.tips[string]
-        lean = np.hypot(u, v) / model.link_radius
+        lean = np.hypot(u, v) / model.tip_radius
         on_link = np.array([0, 0, seed.lengths[-1]])
         quarter = np.pi / 2
         side = np.array([u, v, 0]) / np.hypot(u, v)
-        on_link = on_link + model.link_radius * (
+        on_link = on_link + model.tip_radius * (
             np.sin(min(lean, quarter)) * side + np.cos(min(lean, quarter)) * np.array([0, 0, 1])
         )
-        on_link[2] -= max(lean - quarter, 0) * model.link_radius
+        on_link[2] -= max(lean - quarter, 0) * model.tip_radius
         np.testing.assert_allclose(points[k], finger.point(angles, on_link), atol=1e-6)
         np.testing.assert_allclose(jacobians[k], finger.jacobian(angles, on_link), atol=1e-5)
     np.testing.assert_allclose(seed.axis_vectors, finger.axes, atol=1e-6)

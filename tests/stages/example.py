@@ -20,6 +20,7 @@ from casadi_hands.problem.si import build_model
 from casadi_hands.task import Task, parse_task
 
 Array = np.ndarray
+Chain = list[tuple[Array, Array]]
 SPLINE_WIDTH = 1e-3  # half the width of g's transition in the collision terms
 STAND = 1.05  # radii of its links that a finger's first joint stands above the palm's face
 
@@ -75,6 +76,16 @@ fingers: {thumb: {touches: [0.005, 0, 0]}, index: {touches: [-0.005, 0, 0]}}
 def everything() -> tuple[Task, Model]:
     task = parse_task(everything_text())
     return task, build_model(task)
+
+
+def with_tips(model: Model) -> Model:
+    """The model with fingertips 1.4 times as thick as the links behind them, and a last link that is longer for it."""
+    return replace(model, tip_radius=1.4 * model.link_radius, shortest_last=1.2 * model.link_length[0])
+
+
+def sizes_of(model: Model, joints: int) -> list[float]:
+    """Radii of a finger's links: only the last one's is the fingertip's."""
+    return [model.tip_radius if j == joints - 1 else model.link_radius for j in range(joints)]
 
 
 def drawing() -> tuple[Task, Model]:
@@ -223,6 +234,31 @@ def segments_apart(a: Array, b: Array, c: Array, d: Array) -> float:
     return float(min(ends))
 
 
+def joints_and_tip(chain: Chain, radii: Sequence[float]) -> list[tuple[Array, float]]:
+    """A finger's joints and its tip, each with the radius of the thickest link that ends there."""
+    ends = [chain[0][0], *(end for _, end in chain)]
+    return [(end, max(radii[max(j - 1, 0) : j + 1])) for j, end in enumerate(ends)]
+
+
+def from_palm_and_self(chain: Chain, radii: Sequence[float], palm_radius: float) -> list[float]:
+    """Distances of a finger's links from the palm, and of those that are no neighbours from each other."""
+    ends = joints_and_tip(chain, radii)[1:]
+    marked = ends[:1]
+    for (start, end), radius, at_end in zip(chain[1:], radii[1:], ends[1:], strict=True):
+        marked += [((start + end) / 2, radius), at_end]
+    apart = [palm_apart(point, palm_radius) - radius for point, radius in marked]
+    for i, j in itertools.combinations(range(len(chain)), 2):
+        if j > i + 1:
+            apart.append(segments_apart(*chain[i], *chain[j]) - radii[i] - radii[j])
+    return apart
+
+
+def fingers_apart(one: Chain, radii: Sequence[float], other: Chain, other_radii: Sequence[float]) -> list[float]:
+    """Distances between the links of two fingers."""
+    pairs = itertools.product(zip(one, radii, strict=True), zip(other, other_radii, strict=True))
+    return [segments_apart(*a, *b) - radius - thick for (a, radius), (b, thick) in pairs]
+
+
 def folds_apart(chain: Sequence[tuple[Array, Array]], radius: float) -> list[float]:
     """How far neighbouring links are from the sharpest fold, of cosine -0.3, times a radius; law of cosines."""
     folds = []
@@ -305,7 +341,7 @@ class Motion:
 
 @dataclass
 class PinFinger:
-    """A finger in numeric Pinocchio, palm frame, with links of a radius."""
+    """A finger in numeric Pinocchio, palm frame, its first link of a radius."""
 
     seed: FingerSeed
     radius: float

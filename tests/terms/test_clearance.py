@@ -13,7 +13,7 @@ from casadi_hands.geometry.bodies.sphere import Sphere
 from casadi_hands.task.hand import SHORTEST_HINGE
 from casadi_hands.terms import clearance
 
-RADIUS = 0.1
+RADIUS, THICK = 0.1, 0.16
 # A finger of three links, well away from what it is measured against.
 JOINTS = np.array([[0.2, 0, 0], [0.3, 0.2, 0.8], [0.1, 0.9, 1.3], [-0.6, 1.2, 1.2]])
 OTHER = np.array([[-0.7, 0, 0], [-0.9, -0.4, 0.9], [-0.2, -0.8, 1.6]])
@@ -30,8 +30,13 @@ def fold(points: np.ndarray, joint: int) -> float:
 def of_one(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Distances of links that are no neighbours, and how far neighbours are from the sharpest fold."""
     ends = [(ca.SX(a), ca.SX(b)) for a, b in itertools.pairwise(points)]
-    apart, unfolded = (term(ends, ca.SX(RADIUS)) for term in (clearance.links_of_one, clearance.unfolded))
+    apart, unfolded = clearance.links_of_one(ends, radii(points)), clearance.unfolded(ends, ca.SX(RADIUS))
     return np.asarray(ca.evalf(apart)).ravel(), np.asarray(ca.evalf(unfolded)).ravel()
+
+
+def radii(points: np.ndarray) -> list[ca.SX]:
+    """Of a finger's links: the last one is thicker."""
+    return [*[ca.SX(RADIUS)] * (len(points) - 2), ca.SX(THICK)]
 
 
 def links(points: np.ndarray) -> list[tuple[ca.DM, ca.DM]]:
@@ -60,25 +65,25 @@ def test_overlap_is_the_square_of_what_is_too_deep() -> None:
 def test_links_and_object() -> None:
     ends = [(ca.SX(a), ca.SX(b)) for a, b in itertools.pairwise(JOINTS)]
     bodies = [type(body).surface(ca.SX(body.parameters)) for body in BODIES]
-    found = np.asarray(ca.evalf(clearance.links_and_object(ends, ca.SX(RADIUS), bodies))).ravel()
+    found = np.asarray(ca.evalf(clearance.links_and_object(ends, radii(JOINTS), bodies))).ravel()
     axes = [(BODIES[0].start, BODIES[0].end, 0.3), (BODIES[1].center, BODIES[1].center, 0.25)]
     expected = [
-        coal_distance(a, b, start, end, RADIUS, radius)
-        for a, b in itertools.pairwise(JOINTS)
+        coal_distance(a, b, start, end, thick, radius)
+        for (a, b), thick in zip(itertools.pairwise(JOINTS), (RADIUS, RADIUS, THICK), strict=True)
         for start, end, radius in axes
     ]
     np.testing.assert_allclose(found, expected, atol=5e-4)
 
 
 def test_links_of_two_fingers_and_of_one() -> None:
-    found = np.asarray(clearance.links_and_links(links(JOINTS), links(OTHER), ca.DM(RADIUS))).ravel()
-    expected = [
-        coal_distance(*JOINTS[i : i + 2], *OTHER[j : j + 2], RADIUS, RADIUS) for i in range(3) for j in range(2)
-    ]
+    both = (links(JOINTS), radii(JOINTS)), (links(OTHER), radii(OTHER))
+    found = np.asarray(ca.evalf(clearance.links_and_links(*both))).ravel()
+    thick = {(i, j): (THICK if i == 2 else RADIUS, THICK if j == 1 else RADIUS) for i in range(3) for j in range(2)}
+    expected = [coal_distance(*JOINTS[i : i + 2], *OTHER[j : j + 2], *sizes) for (i, j), sizes in thick.items()]
     np.testing.assert_allclose(found, expected, atol=5e-4)
     folds = [fold(JOINTS, 1), fold(JOINTS, 2)]
     apart, unfolded = of_one(JOINTS)
-    np.testing.assert_allclose(apart, [coal_distance(*JOINTS[:2], *JOINTS[2:], RADIUS, RADIUS)], atol=5e-4)
+    np.testing.assert_allclose(apart, [coal_distance(*JOINTS[:2], *JOINTS[2:], RADIUS, THICK)], atol=5e-4)
     np.testing.assert_allclose(unfolded, folds, atol=5e-4)
     assert of_one(JOINTS[:3])[0].size == 0
     np.testing.assert_allclose(of_one(JOINTS[:3])[1], folds[:1], atol=5e-4)
@@ -97,22 +102,32 @@ def test_neighbours_that_fold_no_sharper_than_allowed_are_clear_of_each_other(de
     hinge = SHORTEST_HINGE * RADIUS
     apart = coal_distance([0, 0, hinge], points[1], points[1] + hinge * along, points[2], RADIUS, RADIUS)
     assert (apart > 0) == (degrees < 107.7)
+    # A thicker last link begins as many of its own radii off.
+    for thick in (1.5 * RADIUS, 2 * RADIUS):
+        hinge = SHORTEST_HINGE * thick
+        root, tip = points[1] + hinge * along, points[1] + (hinge + length) * along
+        apart = coal_distance([0, 0, -1], points[1], root, tip, RADIUS, thick)
+        assert apart > 0 or degrees > 107.7
     assert (found > 0) == (degrees < 107.45)
 
 
 def test_links_and_palm_are_seen_beside_above_and_below_its_rim() -> None:
     # The palm is a coal cylinder below z = 0; the far end of the first link, middles and ends of the others.
-    found = np.asarray(clearance.links_and_palm(links(JOINTS), ca.DM(RADIUS), ca.DM(0.5))).ravel()
+    found = np.asarray(ca.evalf(clearance.links_and_palm(links(JOINTS), radii(JOINTS), ca.DM(0.5)))).ravel()
     palm, frame = coal.Cylinder(0.5, 10), coal.Transform3s(np.eye(3), np.array([0, 0, -5.0]))
     points = [JOINTS[1], JOINTS[1:3].mean(axis=0), JOINTS[2], JOINTS[2:].mean(axis=0), JOINTS[3]]
-    for value, point in zip(found, points, strict=True):
+    # The last link is thicker, from its joint on.
+    thick = [RADIUS, RADIUS, THICK, THICK, THICK]
+    for value, point, radius in zip(found, points, thick, strict=True):
         at = coal.Transform3s(np.eye(3), point)
-        sphere = coal.Sphere(RADIUS)
+        sphere = coal.Sphere(radius)
         truth = coal.distance(palm, frame, sphere, at, coal.DistanceRequest(), coal.DistanceResult())
         assert value == pytest.approx(truth, abs=1e-5)
 
 
 def test_links_and_ground_are_heights_along_its_normal() -> None:
     up = np.array([1, 2, 2]) / 3
-    found = np.asarray(clearance.links_and_ground(links(JOINTS), ca.DM(RADIUS), ca.DM(up), ca.DM(-0.4))).ravel()
-    np.testing.assert_allclose(found, JOINTS @ up + 0.4 - RADIUS, atol=1e-12)
+    found = np.asarray(
+        ca.evalf(clearance.links_and_ground(links(JOINTS), radii(JOINTS), ca.DM(up), ca.DM(-0.4)))
+    ).ravel()
+    np.testing.assert_allclose(found, JOINTS @ up + 0.4 - [RADIUS, RADIUS, THICK, THICK], atol=1e-12)

@@ -90,9 +90,9 @@ class Declaration:
         self.shape: list[dict[str, Rows]] = []
         for c, n in zip(structure.contacts, structure.joints, strict=True):
             self.angles.append(problem.variable(f"angles{c}", (count, n), *limits, quantity="angles", owner=c))
-            shapes: dict[str, tuple[int, float, float]] = {
+            shapes: dict[str, tuple[int, ArrayLike, float]] = {
                 "base": (2, -reach, reach),
-                "lengths": (n, *model.link_length),
+                "lengths": (n, model.least_lengths(n), model.link_length[1]),
                 "axes": (2 * n, -AXIS_RANGE, AXIS_RANGE),
                 "bends": (2 * n, -model.bend, model.bend),
             }
@@ -121,7 +121,7 @@ class Declaration:
     def _declare_parameters(self) -> None:
         problem, structure, count = self.problem, self.structure, self.knots
         widths = {"reference": 4, "gravity": 3, "inertial": 1, "inertia": 9, "inverse": 9, "radius": 1, "hinge": 1}
-        widths |= {"palm_radius": 1, "ground_height": 1, "friction": 1}
+        widths |= {"tip_radius": 1, "palm_radius": 1, "ground_height": 1, "friction": 1}
         widths |= {"bodies": width_of(structure.model.kinds)}
         if structure.model.servo:
             widths |= {"servo_radius": 1}
@@ -180,7 +180,7 @@ class Declaration:
 
     def scene(self, contact: int, knots: Knots) -> dict[str, Parameter]:
         """What places object and palm for a contact at some knots."""
-        names = ("reference", "palm_position", "palm_quaternion", "radius", "hinge")
+        names = ("reference", "palm_position", "palm_quaternion", "radius", "tip_radius", "hinge")
         return self.at(knots, *names) | self.of(contact, knots, "body")
 
     def bind(

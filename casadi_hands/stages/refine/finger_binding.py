@@ -104,7 +104,7 @@ def bind_rolling(of: Declaration, i: int) -> None:
         point=point.combine(halves),
         angles=of.angles[i].combine(halves),
         force=force.combine(halves),
-        **of.at(start, "reference", "radius", "hinge"),
+        **of.at(start, "reference", "radius", "tip_radius", "hinge"),
         **of.between(start),
         **of.of(c, start, "frames", "body"),
     )
@@ -117,7 +117,7 @@ def _shape(of: Declaration, i: int, knots: Knots) -> dict[str, Rows]:
 
 def _radii(model: Model) -> tuple[str, ...]:
     """Parameters of what is kept clear: links, and servos in the joints if there are any."""
-    return ("radius", "servo_radius") if model.servo else ("radius",)
+    return ("radius", "tip_radius", *(("servo_radius",) if model.servo else ()))
 
 
 def bind_clearance(of: Declaration, i: int) -> None:
@@ -169,7 +169,7 @@ def bind_shape(of: Declaration, i: int) -> None:
     four = [of.angles[i].take(first + offset) for offset in range(4)]
     problem.bind(kernels.joint_jerk(n), angles=four, step=of.steps(first, first + 1, first + 2))
     wanted = of.of(c, first, *[f"wanted_{name}" for name in of.shape[i]])
-    reach = (model.palm_radius - model.link_radius) ** 2
+    reach = (model.palm_radius - model.radii(n)[0]) ** 2
     of.bind(None, kernels.near_design(n), {"on_palm": (0, reach)}, (c,), f"near_design{c}", **of.shape[i], **wanted)
     if model.hinged or model.bend:
         shape = {name: of.shape[i][name] for name in ("axes", "bends")} | {"frames": problem[f"frames{c}"]}

@@ -12,6 +12,7 @@ from casadi_hands.geometry import norm
 from casadi_hands.geometry.bodies import Body, Surface, surfaces, width_of
 from casadi_hands.geometry.bodies.capsule import Segment
 from casadi_hands.geometry.surface import path_between, tangents
+from casadi_hands.kinematics import link_radii
 from casadi_hands.kinematics.singularity import MARGIN_SIZES, singularity_margin
 from casadi_hands.kinematics.symbols import FingerSymbols, PlacedFinger, morphology, morphology_sizes
 from casadi_hands.motion import conjugate, derivative, rotation_matrix
@@ -39,7 +40,7 @@ class Touch:
     Attributes:
         on_link: (3,) the contact in the last link's frame.
         off_object: signed distance of the contact from the object's surface.
-        off_link: (3,) how far the link's axis is from a link's radius above the object's surface, object frame: zero
+        off_link: (3,) how far the link's axis is from its radius above the object's surface, object frame: zero
             where surfaces touch with opposed normals, and linear in where the link is, so that none ends up inside.
         normal: (3,) outward from the object, object frame.
         link_normal: (3,) outward from the link, link frame.
@@ -65,6 +66,7 @@ class Scene:
     palm_quaternion: SX
     body: Surface
     radius: SX
+    tip_radius: SX
     hinge: SX
 
     @classmethod
@@ -79,7 +81,12 @@ class Scene:
             declared(n, k) for n, k in (("reference", 4), ("palm_position", 3), ("palm_quaternion", 4))
         )
         body = kind.surface(declared("body", kind.width))
-        return cls(reference, position, quaternion, body, declared("radius", 1), declared("hinge", 1))
+        sizes = (declared(each, 1) for each in ("radius", "tip_radius", "hinge"))
+        return cls(reference, position, quaternion, body, *sizes)
+
+    def standing(self, symbols: FingerSymbols) -> SX:
+        """Radius of the finger's first link, which stands on the palm."""
+        return link_radii(symbols.joints, self.radius, self.tip_radius)[0]
 
     def touch(self, pose: SX, point: SX, angles: SX, symbols: FingerSymbols) -> Touch:
         """See a contact point (3,), object frame, from the object and from a finger's last link."""
@@ -87,14 +94,15 @@ class Scene:
         to_palm = rotation_matrix(conjugate(self.palm_quaternion))
         rotation = ca.mtimes(to_palm, rotation_matrix(quaternion))
         in_palm = ca.mtimes(rotation, point) + ca.mtimes(to_palm, position - self.palm_position)
-        skeleton = symbols.placed(angles, self.radius)
+        standing = self.standing(symbols)
+        skeleton = symbols.placed(angles, standing)
         on_link = ca.mtimes(skeleton.tip_rotation.T, in_palm - skeleton.origins[:, -1])
         off_object, normal = self.body.distance_and_normal(point, ROUNDING)
         axis = Segment(ca.vertcat(0, 0, self.hinge), ca.vertcat(0, 0, symbols.lengths[-1]))
         from_axis = axis.offset(on_link)
         from_link = ca.mtimes(rotation.T, ca.mtimes(skeleton.tip_rotation, from_axis))
-        off_link = from_link + self.radius * normal
-        here = symbols.placed(angles, self.radius, on_link)
+        off_link = from_link + self.tip_radius * normal
+        here = symbols.placed(angles, standing, on_link)
         return Touch(on_link, off_object, off_link, normal, from_axis / norm(from_axis, ROUNDING), rotation, here)
 
 
@@ -230,16 +238,19 @@ def apart(
     reference, palm_position, palm_quaternion = (
         kernel.parameter(n, k) for n, k in (("reference", 4), ("palm_position", 3), ("palm_quaternion", 4))
     )
-    radius, palm_radius, ground = (kernel.parameter(name) for name in ("radius", "palm_radius", "ground_height"))
+    radius, tip_radius, palm_radius, ground = (
+        kernel.parameter(name) for name in ("radius", "tip_radius", "palm_radius", "ground_height")
+    )
+    radii = link_radii(joints, radius, tip_radius)
     bodies = surfaces(kinds, kernel.parameter("bodies", width_of(kinds)))
     position, quaternion = placed(pose, reference)
     to_palm = rotation_matrix(conjugate(palm_quaternion))
     rotation, center = ca.mtimes(to_palm, rotation_matrix(quaternion)), ca.mtimes(to_palm, position - palm_position)
     seen = [body.mapped(lambda point: ca.mtimes(rotation, point) + center) for body in bodies]
-    here = symbols.placed(angles, radius)
+    here = symbols.placed(angles, radii[0])
     up = to_palm[:, 2] if grounded else None
     servo = kernel.parameter("servo_radius") if servos else None
-    clear, last = distances(here, radius, palm_radius, seen, up, ground - palm_position[2], servo)
+    clear, last = distances(here, radii, palm_radius, seen, up, ground - palm_position[2], servo)
     others = [last[k] for k in range(len(kinds)) if k != touched]
     kernel.constrain(limits.CLEAR, ca.vertcat(clear, *others))
     if joints > 1:
@@ -255,10 +266,12 @@ def fingers_apart(joints: int, other_joints: int, servos: bool = False) -> Kerne
     angles = kernel.variable("angles0", joints, "angles", 0)
     second = free_morphology(kernel, other_joints, 1)
     other_angles = kernel.variable("angles1", other_joints, "angles", 1)
-    radius = kernel.parameter("radius")
+    radius, tip_radius = kernel.parameter("radius"), kernel.parameter("tip_radius")
     servo = kernel.parameter("servo_radius") if servos else None
-    ends = first.placed(angles, radius).ends, second.placed(other_angles, radius).ends
-    kernel.constrain(limits.CLEAR_OF_EACH_OTHER, clearance.two_fingers(*ends, radius, servo))
+    radii, other_radii = (link_radii(n, radius, tip_radius) for n in (joints, other_joints))
+    links = first.placed(angles, radii[0]).ends, radii
+    others = second.placed(other_angles, other_radii[0]).ends, other_radii
+    kernel.constrain(limits.CLEAR_OF_EACH_OTHER, clearance.two_fingers(links, others, servo))
     return kernel
 
 

@@ -20,20 +20,20 @@ def pass_through(structure: Structure, hand: WholeHand) -> bool:
         structure: of the fingers; its knots are those of the motion.
         hand: the motion.
     """
-    weights, radius = structure.inner.weights(), structure.model.link_radius
+    weights, model = structure.inner.weights(), structure.model
     if not len(weights):
         return False
     shapes = [np.concatenate([f.base, f.lengths, f.axes.reshape(-1), f.bends.reshape(-1)]) for f in hand.fingers]
     moving = [_columns(s, weights @ angles) for s, angles in zip(shapes, hand.angles, strict=True)]
     frames = [f.frames.transpose(0, 2, 1).reshape(-1) for f in hand.fingers]
-    count = len(weights)
+    count, radii = len(weights), [model.link_radius, model.tip_radius]
     for i in range(len(hand.fingers)):
         for j in range(i):
             kernel = fingers_apart(structure.joints[i], structure.joints[j])
             (functions,) = kernel_functions([kernel])
-            fixed = np.tile(np.concatenate([frames[i], frames[j], [radius]])[:, None], count)
+            fixed = np.tile(np.concatenate([frames[i], frames[j], radii])[:, None], count)
             _, _, clear = functions.value.map(count)(np.vstack([moving[i], moving[j]]), fixed, np.zeros((0, count)))
-            if np.asarray(clear).min() < -DEEP * radius:
+            if np.asarray(clear).min() < -DEEP * model.link_radius:
                 return True
     return False
 

@@ -223,6 +223,7 @@ class RefineValues:
             "inertia": model.inertia.reshape(1, 9),
             "inverse": np.linalg.inv(model.inertia).reshape(1, 9),
             "radius": model.link_radius,
+            "tip_radius": model.tip_radius,
             "hinge": model.hinge,
             "palm_radius": model.palm_radius,
             "ground_height": model.ground_height,

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from casadi_hands.geometry.bodies import Body, surfaces, width_of
+from casadi_hands.kinematics import link_radii
 from casadi_hands.kinematics.symbols import morphology, tip_point
 from casadi_hands.nlp import Kernel
 from casadi_hands.terms import clearance, finger
@@ -23,19 +24,21 @@ def follow(joints: int) -> Kernel:
     frames = kernel.parameter("frames", 9 * joints)
     symbols = morphology(kernel.variable, frames, joints)
     angles, tip = kernel.variable("angles", joints), kernel.variable("tips", 2)
-    target, force, active, radius, lowest, highest = (
+    target, force, active, radius, tip_radius, lowest, highest = (
         kernel.parameter(name, size)
         for name, size in (
             ("target", 3),
             ("force", 3),
             ("active", 1),
             ("link_radius", 1),
+            ("tip_radius", 1),
             ("lowest", 1),
             ("highest", 1),
         )
     )
-    point, _ = tip_point(tip, symbols.lengths[-1], radius)
-    placed = symbols.placed(angles, radius, point)
+    radii = link_radii(joints, radius, tip_radius)
+    point, _ = tip_point(tip, symbols.lengths[-1], radii[-1])
+    placed = symbols.placed(angles, radii[0], point)
     kernel.cost(finger.TIP_TARGET, active * (placed.contact - target))
     kernel.cost(finger.NULL_SPACE, active * finger.null_space(placed.jacobian, force))
     kernel.cost(finger.TORQUE, active * finger.joint_torques(placed.jacobian, force))
@@ -49,12 +52,14 @@ def build(joints: int) -> Kernel:
     kernel = Kernel("build")
     base, lengths = kernel.variable("base", 2), kernel.variable("lengths", joints)
     kernel.cost(finger.BEND, kernel.variable("bends", 2 * joints))
-    palm_radius, radius, shortest, longest = (
-        kernel.parameter(n) for n in ("palm_radius", "link_radius", "shortest", "longest")
+    palm_radius, radius, tip_radius, shortest, shortest_last, longest = (
+        kernel.parameter(n)
+        for n in ("palm_radius", "link_radius", "tip_radius", "shortest", "shortest_last", "longest")
     )
+    least = ca.vertcat(*[shortest] * (joints - 1), shortest_last)
     kernel.cost(finger.LENGTH, lengths)
-    kernel.cost(finger.MINIMUM_LENGTH, finger.beyond_limits(lengths, shortest, longest))
-    kernel.cost(finger.FINGER_BASE, finger.off_palm(base, palm_radius - radius))
+    kernel.cost(finger.MINIMUM_LENGTH, finger.beyond_limits(lengths, least, longest))
+    kernel.cost(finger.FINGER_BASE, finger.off_palm(base, palm_radius - link_radii(joints, radius, tip_radius)[0]))
     return kernel
 
 
@@ -65,21 +70,24 @@ def collide(joints: int, kinds: tuple[type[Body], ...], servos: bool = False) ->
     frames = kernel.parameter("frames", 9 * joints)
     symbols = morphology(kernel.variable, frames, joints)
     angles = kernel.variable("angles", joints)
-    radius, palm_radius, margin = (kernel.parameter(name) for name in ("link_radius", "palm_radius", "margin"))
+    radius, tip_radius, palm_radius, margin = (
+        kernel.parameter(name) for name in ("link_radius", "tip_radius", "palm_radius", "margin")
+    )
+    radii = link_radii(joints, radius, tip_radius)
     bodies = surfaces(kinds, kernel.parameter("bodies", width_of(kinds)))
     up, ground = kernel.parameter("up", 3), kernel.parameter("ground")
-    ends = symbols.placed(angles, radius).ends
+    ends = symbols.placed(angles, radii[0]).ends
     apart = [
-        clearance.links_and_palm(ends, radius, palm_radius),
-        clearance.links_and_ground(ends, radius, up, ground),
-        clearance.links_of_one(ends, radius),
+        clearance.links_and_palm(ends, radii, palm_radius),
+        clearance.links_and_ground(ends, radii, up, ground),
+        clearance.links_of_one(ends, radii),
     ]
     if joints > 1:
-        apart.append(clearance.links_and_object(ends[:-1], radius, bodies))
+        apart.append(clearance.links_and_object(ends[:-1], radii[:-1], bodies))
     if servos:
         servo = kernel.parameter("servo_radius")
-        apart.append(clearance.servos_and_rest(ends, radius, servo, palm_radius, bodies, up, ground))
-    touching, folds = clearance.links_and_object(ends[-1:], radius, bodies), clearance.unfolded(ends, radius)
+        apart.append(clearance.servos_and_rest(ends, radii, servo, palm_radius, bodies, up, ground))
+    touching, folds = clearance.links_and_object(ends[-1:], radii[-1:], bodies), clearance.unfolded(ends, radius)
     kernel.cost(clearance.COLLISION, clearance.overlap(ca.vertcat(margin - ca.vertcat(*apart), -touching, -folds)))
     return kernel
 
@@ -94,10 +102,12 @@ def keep_apart(joints: int, other_joints: int, servos: bool = False) -> Kernel:
     angles = kernel.variable("angles0", joints, "angles", 0)
     second = morphology(kernel.variable, other_frames, other_joints, 1)
     other_angles = kernel.variable("angles1", other_joints, "angles", 1)
-    radius, margin = kernel.parameter("link_radius"), kernel.parameter("margin")
-    ends = first.placed(angles, radius).ends, second.placed(other_angles, radius).ends
+    radius, tip_radius, margin = (kernel.parameter(name) for name in ("link_radius", "tip_radius", "margin"))
+    radii, other_radii = (link_radii(n, radius, tip_radius) for n in (joints, other_joints))
+    links = first.placed(angles, radii[0]).ends, radii
+    others = second.placed(other_angles, other_radii[0]).ends, other_radii
     servo = kernel.parameter("servo_radius") if servos else None
-    kernel.cost(clearance.COLLISION, clearance.overlap(margin - clearance.two_fingers(*ends, radius, servo)))
+    kernel.cost(clearance.COLLISION, clearance.overlap(margin - clearance.two_fingers(links, others, servo)))
     return kernel
 
 

@@ -33,7 +33,7 @@ _STAY = 0.005  # weight of staying with the planned forces, which bounds the squ
 def finger_scores(target: Target, hand: Synthesised) -> Array:
     """Score (F,) of each finger: 50·(tip distance in lengths)² plus structural force in m·g, keyframe means."""
     placed = [
-        contact_kinematics(finger, target.string_of(contact), target.link_radius)
+        contact_kinematics(finger, target.string_of(contact), target.radii(finger.joints))
         for finger, contact in zip(hand.fingers, hand.contacts, strict=True)
     ]
     scores = np.zeros(len(placed))
@@ -54,7 +54,7 @@ def singular_fingers(target: Target, hand: Synthesised) -> int:
     """How many fingers pass a singular pose while they touch: those may well have no exact motion."""
     count = 0
     for finger, contact in zip(hand.fingers, hand.contacts, strict=True):
-        _, jacobians = contact_kinematics(finger, target.string_of(contact), target.link_radius)
+        _, jacobians = contact_kinematics(finger, target.string_of(contact), target.radii(finger.joints))
         count += passes_singularity(jacobians, target.active[:, contact])
     return count
 
@@ -62,7 +62,7 @@ def singular_fingers(target: Target, hand: Synthesised) -> int:
 def worst_miss(target: Target, hand: Synthesised, contact: int) -> tuple[float, float]:
     """How far (lengths) and when (s) a finger is farthest from its contact while that acts."""
     finger = hand.fingers[hand.contacts.index(contact)]
-    points, _ = contact_kinematics(finger, target.string_of(contact), target.link_radius)
+    points, _ = contact_kinematics(finger, target.string_of(contact), target.radii(finger.joints))
     misses = np.where(target.active[:, contact], np.linalg.norm(points - target.points[:, contact], axis=1), 0.0)
     k = int(misses.argmax())
     return float(misses[k]), float(target.times[k])

@@ -21,11 +21,11 @@ def random_finger(target: Target, contact: int, joints: int, rng: np.random.Gene
     Lengths are drawn about what it takes to span from the base to the contact.
     """
     low, high = target.joint_limits
-    shortest, longest = target.link_length
+    radius, longest = target.radii(joints)[0], target.link_length[1]
     direction, distance = rng.uniform(0, 2 * np.pi), np.sqrt(rng.uniform())
-    base = (target.palm_radius - target.link_radius) * distance * np.array([np.cos(direction), np.sin(direction)])
-    span = np.linalg.norm(target.points[:, contact].mean(axis=0) - np.append(base, STAND * target.link_radius))
-    lengths = np.clip(rng.uniform(0.8, 1.6, joints) * span / joints, shortest, longest)
+    base = (target.palm_radius - radius) * distance * np.array([np.cos(direction), np.sin(direction)])
+    span = np.linalg.norm(target.points[:, contact].mean(axis=0) - np.append(base, STAND * radius))
+    lengths = np.clip(rng.uniform(0.8, 1.6, joints) * span / joints, target.least_lengths(joints), longest)
     angles = rng.uniform(0.6 * low, 0.6 * high, joints)
     tip = target.tip_arc * rng.uniform(-0.7, 0.7, (target.strings(contact), 2))
     # No axis stands nearer than by half the bend to both links beside it.

@@ -45,8 +45,9 @@ def beyond_reach(target: Target, contact: int, joints: int) -> Array:
     """
     points = target.points[:, contact]
     outside = np.maximum(np.hypot(points[:, 0], points[:, 1]) - target.palm_radius, 0.0)
-    reach = joints * target.link_length[1] + target.link_radius
-    height = points[:, 2] - STAND * target.link_radius
+    radii = target.radii(joints)
+    reach = joints * target.link_length[1] + radii[-1]
+    height = points[:, 2] - STAND * radii[0]
     return np.where(target.active[:, contact], np.hypot(outside, height) - reach, -np.inf)
 
 
@@ -66,7 +67,7 @@ def shortcoming(target: Target, hand: Synthesised, contact: int, score: float) -
     k = goals[int(beyond[goals].argmax())] if beyond[goals].max() > 0 else int(beyond.argmax())
     if beyond[k] > 0:
         return Shortcoming("reach", contact, finger.joints, float(beyond[k]), float(target.times[k]))
-    points, _ = contact_kinematics(finger, target.string_of(contact), target.link_radius)
+    points, _ = contact_kinematics(finger, target.string_of(contact), target.radii(finger.joints))
     squares = ((points - target.points[:, contact]) ** 2).sum(axis=1)[target.active[:, contact]]
     missing = TIP_WEIGHT * float(squares.mean())
     if missing > score / 2:

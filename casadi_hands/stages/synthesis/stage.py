@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from casadi_hands.geometry.bodies import width_of
 from casadi_hands.kinematics.morphology import FingerSeed
@@ -31,6 +31,7 @@ BETWEEN = 2  # collision samples between neighbouring keyframes
 AXIS_RANGE = 2.2  # rad, how far an axis may turn from its seed
 MARGIN = 0.03  # clearance asked of bodies that need not touch, lengths
 MORPHOLOGY = tuple(morphology_sizes(0))
+_RADII, _LENGTHS = ("link_radius", "tip_radius"), ("shortest", "shortest_last", "longest")
 LOOSE = 0.4  # how far the box bounds of angles and lengths are opened while annealing
 
 
@@ -64,14 +65,14 @@ class SynthesisStage:
         """
         self.target, self.contacts, self.joints = target, contacts, joints
         self.problem = problem = Problem()
-        shortest, longest = target.link_length
+        longest = target.link_length[1]
         count = len(target.times)
         rows: list[dict[str, Rows]] = []
         for c, n in zip(contacts, joints, strict=True):
             reach, arc = target.palm_radius, target.tip_arc
-            shapes: dict[str, tuple[tuple[int, int], float, float]] = {
+            shapes: dict[str, tuple[tuple[int, int], ArrayLike, float]] = {
                 "base": ((1, 2), -reach, reach),
-                "lengths": ((1, n), shortest, longest),
+                "lengths": ((1, n), target.least_lengths(n), longest),
                 "axes": ((1, 2 * n), -AXIS_RANGE, AXIS_RANGE),
                 "bends": ((1, 2 * n), -target.model.bend, target.model.bend),
                 "angles": ((count, n), *target.joint_limits),
@@ -90,7 +91,7 @@ class SynthesisStage:
     def _shared_parameters(self) -> None:
         problem, target = self.problem, self.target
         samples = len(target.collision_times(BETWEEN))
-        for name in ("link_radius", "palm_radius", "shortest", "longest", "lowest", "highest", "margin"):
+        for name in (*_RADII, *_LENGTHS, "palm_radius", "lowest", "highest", "margin"):
             problem.parameter(name, (1, 1))
         if target.model.servo:
             problem.parameter("servo_radius", (1, 1))
@@ -119,15 +120,15 @@ class SynthesisStage:
             tips=rows["tips"].take(target.string_of(c)),
             frames=frames,
             **wanted,
-            **problem.given("link_radius", "lowest", "highest"),
+            **problem.given(*_RADII, "lowest", "highest"),
         )
-        limits = problem.given("palm_radius", "link_radius", "shortest", "longest")
+        limits = problem.given("palm_radius", *_RADII, *_LENGTHS)
         problem.bind(build(n), base=rows["base"], lengths=rows["lengths"], bends=rows["bends"], **limits)
         if target.model.hinged or target.model.bend:
             kernel, bounds = buildable(n, target.model.hinged, bool(target.model.bend)), buildable_bounds(target.model)
             problem.bind(kernel, bounds, f"buildable{c}", axes=rows["axes"], bends=rows["bends"], frames=frames)
         times = target.collision_times(BETWEEN)
-        around = ("link_radius", "palm_radius", "margin", "bodies", "up", "ground", *self._servos)
+        around = (*_RADII, "palm_radius", "margin", "bodies", "up", "ground", *self._servos)
         problem.bind(
             collide(n, target.kinds, bool(self._servos)),
             **constant(len(times)),
@@ -151,7 +152,7 @@ class SynthesisStage:
             **shapes,
             angles=[r["angles"].combine(weights) for r in both],
             frames=[self.problem[f"frames{self.contacts[k]}"] for k in (i, j)],
-            **self.problem.given("link_radius", "margin", *self._servos),
+            **self.problem.given(*_RADII, "margin", *self._servos),
         )
 
     @property
@@ -201,9 +202,11 @@ class SynthesisStage:
         target = self.target
         bodies, up, ground = self._scene
         values: dict[str, Array | float] = {
-            "link_radius": target.link_radius,
+            "link_radius": target.model.link_radius,
+            "tip_radius": target.model.tip_radius,
             "palm_radius": target.palm_radius,
             "shortest": target.link_length[0],
+            "shortest_last": target.model.shortest_last,
             "longest": target.link_length[1],
             "lowest": target.joint_limits[0],
             "highest": target.joint_limits[1],

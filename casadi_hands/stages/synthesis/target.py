@@ -47,10 +47,13 @@ class Target:
         """Of the disc, lengths."""
         return self.model.palm_radius
 
-    @property
-    def link_radius(self) -> float:
-        """Of every link, lengths."""
-        return self.model.link_radius
+    def radii(self, joints: int) -> list[float]:
+        """Of a finger's links, lengths."""
+        return self.model.radii(joints)
+
+    def least_lengths(self, joints: int) -> Array:
+        """(n,) shortest that a finger's links may be, lengths."""
+        return self.model.least_lengths(joints)
 
     @property
     def link_length(self) -> tuple[float, float]:
@@ -70,7 +73,7 @@ class Target:
     @property
     def tip_arc(self) -> float:
         """How far along the fingertip's surface a contact may be from the cap's pole."""
-        return self.link_radius * np.pi / 2 + 0.3 * self.link_length[0]
+        return self.model.tip_radius * np.pi / 2 + 0.3 * self.link_length[0]
 
     def string_of(self, contact: int) -> NDArray[np.int64]:
         """For each keyframe (N,) the string of a contact's active keyframes it belongs to."""

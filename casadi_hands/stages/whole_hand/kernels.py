@@ -10,6 +10,7 @@ from casadi import SX
 
 from casadi_hands.geometry.bodies import Body, Surface, surfaces, width_of
 from casadi_hands.geometry.bodies.capsule import Segment
+from casadi_hands.kinematics import link_radii
 from casadi_hands.kinematics.symbols import FingerSymbols, PlacedFinger, morphology
 from casadi_hands.motion import rotation_matrix
 from casadi_hands.motion.pose import placed
@@ -36,23 +37,24 @@ def touch(joints: int, moves: bool) -> Kernel:
     palm, palm_before = Palm(kernel, moves), Palm(kernel, moves, before=True)
     symbols = given_morphology(kernel, joints)
     reference = kernel.parameter("reference", 4)
-    radius, hinge, friction, sharpness, step = (
-        kernel.parameter(n) for n in ("link_radius", "hinge", "friction", "sharpness", "step")
+    radius, tip_radius, hinge, friction, sharpness, step = (
+        kernel.parameter(n) for n in ("link_radius", "tip_radius", "hinge", "friction", "sharpness", "step")
     )
+    radii = link_radii(joints, radius, tip_radius)
     position, quaternion = placed(pose, reference)
     rotation = rotation_matrix(quaternion)
     in_palm = palm.sees(position + ca.mtimes(rotation, point))
-    skeleton = symbols.placed(angles, radius)
+    skeleton = symbols.placed(angles, radii[0])
     last = skeleton.origins[:, -1]
     on_link = ca.mtimes(skeleton.tip_rotation.T, in_palm - last)
-    here = symbols.placed(angles, radius, on_link)
-    link = Surface(Segment(ca.vertcat(0, 0, hinge), ca.vertcat(0, 0, symbols.lengths[-1])), radius)
+    here = symbols.placed(angles, radii[0], on_link)
+    link = Surface(Segment(ca.vertcat(0, 0, hinge), ca.vertcat(0, 0, symbols.lengths[-1])), radii[-1])
     projection, normal = link.project(on_link)
     force_in_palm = palm.turned(ca.mtimes(rotation, force))
     kernel.cost(contact.CONTACT_ON_FINGER, contact.off_surface(force, invariant, on_link, projection))
     position_before, quaternion_before = placed(pose_before, reference)
     object_moved = in_palm - palm_before.sees(position_before + ca.mtimes(rotation_matrix(quaternion_before), point))
-    finger_moved = in_palm - symbols.placed(angles_before, radius, on_link).contact
+    finger_moved = in_palm - symbols.placed(angles_before, radii[0], on_link).contact
     kernel.cost(contact.SLIP_ON_FINGER, contact.slip(force, invariant, object_moved, finger_moved, step))
     cone = contact.friction_cone(force_in_palm, ca.mtimes(here.tip_rotation, normal), friction, sharpness)
     kernel.cost(contact.FRICTION_CONE_HAND, invariant * cone)
@@ -83,9 +85,10 @@ def object_clearance(joints: int, kinds: tuple[type[Body], ...], moves: bool, se
     palm = Palm(kernel, moves)
     symbols = given_morphology(kernel, joints)
     reference = kernel.parameter("reference", 4)
-    radius, palm_radius, ground, margin = (
-        kernel.parameter(name) for name in ("link_radius", "palm_radius", "ground_height", "margin")
+    radius, tip_radius, palm_radius, ground, margin = (
+        kernel.parameter(name) for name in ("link_radius", "tip_radius", "palm_radius", "ground_height", "margin")
     )
+    radii = link_radii(joints, radius, tip_radius)
     bodies = surfaces(kinds, kernel.parameter("bodies", width_of(kinds)))
     position, quaternion = placed(pose, reference)
     rotation = rotation_matrix(quaternion)
@@ -94,10 +97,10 @@ def object_clearance(joints: int, kinds: tuple[type[Body], ...], moves: bool, se
         return palm.sees(position + ca.mtimes(rotation, point))
 
     in_palm = [body.mapped(seen) for body in bodies]
-    here = symbols.placed(angles, radius)
+    here = symbols.placed(angles, radii[0])
     up = palm.turned(SX([0, 0, 1]))
     servo = kernel.parameter("servo_radius") if servos else None
-    apart, touching = distances(here, radius, palm_radius, in_palm, up, ground - palm.position[2], servo)
+    apart, touching = distances(here, radii, palm_radius, in_palm, up, ground - palm.position[2], servo)
     folds = clearance.unfolded(here.ends, radius)
     kernel.cost(clearance.COLLISION, clearance.overlap(ca.vertcat(margin - apart, -touching, -folds)))
     return kernel
@@ -105,7 +108,7 @@ def object_clearance(joints: int, kinds: tuple[type[Body], ...], moves: bool, se
 
 def distances(
     here: PlacedFinger,
-    radius: SX,
+    radii: Sequence[SX],
     palm_radius: SX,
     bodies: Sequence[Surface],
     up: SX | None,
@@ -117,14 +120,14 @@ def distances(
     Without a ground ``up`` is None, and so is ``servo``, the radius of a joint's ball with its servo, without these.
     """
     ends = here.ends
-    apart = [clearance.links_and_palm(ends, radius, palm_radius), clearance.links_of_one(ends, radius)]
+    apart = [clearance.links_and_palm(ends, radii, palm_radius), clearance.links_of_one(ends, radii)]
     if up is not None:
-        apart.append(clearance.links_and_ground(ends, radius, up, ground))
+        apart.append(clearance.links_and_ground(ends, radii, up, ground))
     if len(ends) > 1:
-        apart.append(clearance.links_and_object(ends[:-1], radius, bodies))
+        apart.append(clearance.links_and_object(ends[:-1], radii[:-1], bodies))
     if servo is not None:
-        apart.append(clearance.servos_and_rest(ends, radius, servo, palm_radius, bodies, up, ground))
-    return ca.vertcat(*apart), clearance.links_and_object(ends[-1:], radius, bodies)
+        apart.append(clearance.servos_and_rest(ends, radii, servo, palm_radius, bodies, up, ground))
+    return ca.vertcat(*apart), clearance.links_and_object(ends[-1:], radii[-1:], bodies)
 
 
 @cache
@@ -134,10 +137,12 @@ def finger_clearance(joints: int, other_joints: int, servos: bool = False) -> Ke
     angles = kernel.variable("angles0", joints, "angles", 0)
     other_angles = kernel.variable("angles1", other_joints, "angles", 1)
     first, second = given_morphology(kernel, joints, 0), given_morphology(kernel, other_joints, 1)
-    radius, margin = kernel.parameter("link_radius"), kernel.parameter("margin")
+    radius, tip_radius, margin = (kernel.parameter(name) for name in ("link_radius", "tip_radius", "margin"))
+    radii, other_radii = (link_radii(n, radius, tip_radius) for n in (joints, other_joints))
     servo = kernel.parameter("servo_radius") if servos else None
-    ends = first.placed(angles, radius).ends, second.placed(other_angles, radius).ends
-    kernel.cost(clearance.COLLISION, clearance.overlap(margin - clearance.two_fingers(*ends, radius, servo)))
+    links = first.placed(angles, radii[0]).ends, radii
+    others = second.placed(other_angles, other_radii[0]).ends, other_radii
+    kernel.cost(clearance.COLLISION, clearance.overlap(margin - clearance.two_fingers(links, others, servo)))
     return kernel
 
 

@@ -57,7 +57,7 @@ class WholeHandStage:
         if palm_moves:
             palm = problem.variable("palm", (keyframes, 6), -FARTHEST_PALM, FARTHEST_PALM)
         bind_object(problem, model, side, palm)
-        for name in ("link_radius", "hinge", "lowest", "highest", "margin"):
+        for name in ("link_radius", "tip_radius", "hinge", "lowest", "highest", "margin"):
             problem.parameter(name, (1, 1))
         if model.servo:
             problem.parameter("servo_radius", (1, 1))
@@ -101,12 +101,13 @@ class WholeHandStage:
             **moved_before,
             **given,
             **shape,
-            **problem.given("reference", "link_radius", "hinge", "friction", "sharpness", "step"),
+            **problem.given("reference", "link_radius", "tip_radius", "hinge", "friction", "sharpness", "step"),
         )
         palm_pose = ("palm_position", "palm_quaternion")
         limits = problem.given("lowest", "highest", "step")
         problem.bind(kernels.move(joints[c]), angles=(before, now, after), **shape, **limits)
-        around = ("reference", "link_radius", "palm_radius", "ground_height", "margin", "bodies", *palm_pose)
+        radii = ("link_radius", "tip_radius")
+        around = ("reference", *radii, "palm_radius", "ground_height", "margin", "bodies", *palm_pose)
         servos = ("servo_radius",) if model.servo else ()
         problem.bind(
             kernels.object_clearance(joints[c], model.kinds, self.palm_moves, bool(servos)),
@@ -122,7 +123,7 @@ class WholeHandStage:
                 kernels.finger_clearance(joints[c], joints[d], bool(servos)),
                 angles=(now, angles[d].combine(schedule.spline())),
                 **{name: (shape[name], other[name]) for name in shape},
-                **problem.given("link_radius", "margin", *servos),
+                **problem.given(*radii, "margin", *servos),
             )
 
     def _morphology(self, contact: int) -> dict[str, Parameter]:
@@ -162,7 +163,7 @@ class WholeHandStage:
         """Contact points (N, C, 3): the object's point nearest to each finger's contact of stage 2."""
         model, points = self.model, floating.point.copy()
         for finger, c in zip(fingers, self.contacts, strict=True):
-            touched, _ = contact_kinematics(finger, string_of(floating.active[:, c]), model.link_radius)
+            touched, _ = contact_kinematics(finger, string_of(floating.active[:, c]), model.radii(finger.joints))
             for k, in_palm in enumerate(touched):
                 rotation, position = palm_from_world(model, model.schedule.keyframes[k])
                 pose = floating.pose[k]
@@ -176,6 +177,7 @@ class WholeHandStage:
         values = object_parameters(model)
         values |= {
             "link_radius": model.link_radius,
+            "tip_radius": model.tip_radius,
             "hinge": model.hinge,
             **({"servo_radius": model.servo} if model.servo else {}),
             "lowest": model.joint_limits[0],

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from casadi_hands.verify.checks.sizes import radius_of, shortest_of
 from casadi_hands.verify.figures.wrench import planned_torques
 from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.trajectory import Trajectory
 
 STAND = 1.05
-"""Link radii above the palm's face that a finger's first joint stands: its first link just clears the palm."""
+"""Radii of its first link above the palm's face that a finger's first joint stands: that link just clears the palm."""
 ROUNDED = 1e-6
 """Share by which a size may be off."""
 ROUNDED_ANGLE = 5e-3
@@ -72,17 +73,17 @@ def _hinge_problems(folder: Folder) -> list[str]:
 
 def _size_problems(folder: Folder) -> list[str]:
     task, problems = folder.task, []
-    shortest, longest = task.hand.link_length
+    longest = task.hand.link_length[1]
     for name, body in folder.links.items():
         who = folder.call(name)
         if name == "palm":
             continue
         for capsule in body.capsules:
-            length = float(capsule.end[2])
+            length, shortest = float(capsule.end[2]), shortest_of(folder, name)
             if not shortest * (1 - ROUNDED) <= length <= longest * (1 + ROUNDED):
                 allowed = f"{1e3 * shortest:.4g} to {1e3 * longest:.4g} mm"
                 problems.append(f"{who} is {1e3 * length:.4g} mm long; the task allows {allowed}")
-            due = task.hand.link_radius
+            due = radius_of(folder, name)
             if abs(capsule.radius - due) > ROUNDED * due:
                 problems.append(f"{who} has a radius of {1e3 * capsule.radius:.4g} mm, the task {1e3 * due:.4g} mm")
     for name, joint in folder.joints.items():
@@ -91,7 +92,7 @@ def _size_problems(folder: Folder) -> list[str]:
         who, out = folder.call(name.replace("_joint", "_link")), float(np.linalg.norm(joint.position[:2]))
         if out > task.palm.radius * (1 + ROUNDED):
             problems.append(f"{who} stands {1e3 * out:.4g} mm out, off the palm of {1e3 * task.palm.radius:.4g} mm")
-        high = STAND * task.hand.link_radius
+        high = STAND * radius_of(folder, joint.child)
         if not -ROUNDED * high <= joint.position[2] <= high * (1 + ROUNDED):
             problems.append(f"{who} stands {1e3 * joint.position[2]:.4g} mm above the palm's face, not on it")
     return problems

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from casadi_hands.verify.bodies import Body, swept_inertial
 from casadi_hands.verify.checks.servos import put_together
+from casadi_hands.verify.checks.sizes import hinge_of, radius_of
 from casadi_hands.verify.forms import FORMS
 from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.reading.stored import as_array, entry, same
@@ -184,8 +185,8 @@ def _palm_balls(folder: Folder) -> tuple[Capsule, ...]:
     """The balls in which first joints turn, where the task's links do not begin in their joints."""
     if not folder.task.hand.hinge_length:
         return ()
-    at = [joint.position for joint in folder.joints.values() if joint.parent == "palm"]
-    return tuple(Capsule(base, base, float(folder.task.hand.link_radius)) for base in at)
+    first = [joint for joint in folder.joints.values() if joint.parent == "palm"]
+    return tuple(Capsule(joint.position, joint.position, radius_of(folder, joint.child)) for joint in first)
 
 
 def _link_problems(folder: Folder, name: str, stated: Any, parent: str, origin: Any) -> list[str]:
@@ -199,7 +200,7 @@ def _link_problems(folder: Folder, name: str, stated: Any, parent: str, origin: 
     problems = []
     capsule, tip = body.capsules[0], np.array([0.0, 0.0, float(length)])
     hinge = as_array(entry(stated, "hinge"), ()) if "hinge" in stated else np.zeros(())
-    if hinge is None or not same(hinge, folder.task.hand.hinge_length):
+    if hinge is None or not same(hinge, hinge_of(folder, name)):
         return [f"{who}: it does not begin a hinge's length from its joint, as the task has it"]
     root = np.array([0.0, 0.0, float(hinge)])
     if len(body.shapes) > 1:

@@ -17,7 +17,7 @@ from tests.stages.blocks import Place, check_block, frames, numbers, random_fing
 from tests.stages.example import PinFinger, everything, nearest_on_axis
 
 Array = np.ndarray
-RADIUS, HINGE, STIFFNESS, TORSION, MOTORS = 0.2, 0.42, 3.0, 0.4, 2
+LINK, RADIUS, HINGE, STIFFNESS, TORSION, MOTORS = 0.15, 0.2, 0.42, 3.0, 0.4, 2
 
 
 class Pressing:
@@ -37,14 +37,14 @@ class Pressing:
         variables = {"pose": self.place.pose, "point": self.point, "force": self.force, "angles": self.finger.angles}
         variables |= {"ratios": self.ratios, "offsets": self.offsets, "motors": self.motors, **shape(self.finger)}
         parameters = {"frames": frames(self.finger), **self.place.parameters, "body": self.capsule}
-        parameters |= {"radius": RADIUS, "hinge": HINGE, "stiffness": STIFFNESS}
+        parameters |= {"radius": LINK, "tip_radius": RADIUS, "hinge": HINGE, "stiffness": STIFFNESS}
         if self.soft:
             variables["torsion"], parameters["torsion_radius"] = self.torsion, TORSION
         return variables, parameters
 
     def work(self) -> Array:
         """What the force and the moment, fixed in the palm, do over small turns of each joint."""
-        finger, angles = PinFinger(self.finger, RADIUS), self.finger.angles[0]
+        finger, angles = PinFinger(self.finger, RADIUS if self.joints == 1 else LINK), self.finger.angles[0]
         points, rotation = finger.chain(angles)
         on_link = rotation.T @ (self.place.in_palm(self.point) - points[-2])
         on_axis = nearest_on_axis(on_link, np.r_[0, 0, HINGE, 0, 0, self.finger.lengths[-1], RADIUS])

@@ -37,7 +37,7 @@ Block = tuple[dict[str, object], dict[str, object]]
 class Contact:
     """A contact of a random finger and a random capsule, off both surfaces; its force leans out of the cone or not."""
 
-    friction, radius, hinge = 0.6, 0.2, 0.4
+    friction, radius, tip, hinge = 0.6, 0.15, 0.2, 0.4
 
     def __init__(self, joints: int, seed: int) -> None:
         rng = np.random.default_rng((joints, seed))
@@ -49,11 +49,12 @@ class Contact:
         self.wanted_point, self.wanted_force = rng.normal(size=(2, 3))
         self.tie = rng.uniform(0.1, 1)
         self.branch = rng.normal(size={2: 3, 3: 1}.get(joints, 0))
+        self.standing = self.tip if joints == 1 else self.radius  # radius of the first link
 
     @property
     def scene(self) -> dict[str, object]:
         parameters = {"frames": frames(self.finger), **self.place.parameters}
-        return {**parameters, "body": self.capsule, "radius": self.radius, "hinge": self.hinge}
+        return {**parameters, "body": self.capsule, "radius": self.radius, "tip_radius": self.tip, "hinge": self.hinge}
 
     @property
     def contact(self) -> Block:
@@ -87,13 +88,13 @@ def test_a_contact_s_numbers_are_those_of_numpy_and_pinocchio(joints: int, seed:
     case = Contact(joints, seed)
     finger, place, normal, force = case.finger, case.place, case.normal, case.force
     found = numbers(finger_kernels.contact(joints, Capsule, limited=True), *case.contact)
-    chain, link = PinFinger(finger, case.radius).chain(finger.angles[0])
+    chain, link = PinFinger(finger, case.standing).chain(finger.angles[0])
     on_link = link.T @ (place.in_palm(case.point) - chain[-2])
     # Kinks of capsules are rounded by a thousandth of their length.
     np.testing.assert_allclose(found["on_object"], case.off_object, atol=1e-5)
-    axis = np.array([0, 0, case.hinge, 0, 0, finger.lengths[-1], case.radius])
+    axis = np.array([0, 0, case.hinge, 0, 0, finger.lengths[-1], case.tip])
     from_link = place.turn.inv().apply(place.palm.apply(link @ (on_link - nearest_on_axis(on_link, axis))))
-    np.testing.assert_allclose(found["on_link"], from_link + case.radius * normal, atol=5e-3)
+    np.testing.assert_allclose(found["on_link"], from_link + case.tip * normal, atol=5e-3)
     pressing = -force @ normal
     np.testing.assert_allclose(found["pressing"], pressing, atol=2e-3)
     across = force + pressing * normal
@@ -101,7 +102,7 @@ def test_a_contact_s_numbers_are_those_of_numpy_and_pinocchio(joints: int, seed:
     # The fourth power of the friction in use: flat inside the cone, steep towards its edge.
     used = np.linalg.norm(across) / (case.friction * pressing + 0.1)
     np.testing.assert_allclose(found["friction_margin"], used**4, rtol=5e-2)
-    jacobian = PinFinger(finger, case.radius).jacobian(finger.angles[0], on_link)
+    jacobian = PinFinger(finger, case.standing).jacobian(finger.angles[0], on_link)
     in_palm = place.palm.inv().apply(place.turn.apply(force))
     left, singular, _ = np.linalg.svd(jacobian)
     kept = np.ones(3)
@@ -125,16 +126,16 @@ def test_a_contact_s_numbers_are_those_of_numpy_and_pinocchio(joints: int, seed:
 def test_a_link_ends_in_a_cap_about_its_hinge(joints: int) -> None:
     # Where a capsule from the joint on would still be, a hinged link is as far off as its cap is.
     case = Contact(joints, 8)
-    chain, link = PinFinger(case.finger, case.radius).chain(case.finger.angles[0])
+    chain, link = PinFinger(case.finger, case.standing).chain(case.finger.angles[0])
     for below in (0.0, 0.1, 0.4):
-        touched = chain[-2] + link @ [case.radius, 0, case.hinge - below]
+        touched = chain[-2] + link @ [case.tip, 0, case.hinge - below]
         case.place.position = case.place.palm.apply(touched) + case.place.palm_position
         case.place.position -= case.place.turn.apply(case.point)
         found = numbers(finger_kernels.contact(joints, Capsule, limited=True), *case.contact)
         normal = surface(case.point, case.capsule)[1]
         in_object = case.place.turn.inv() * case.place.palm
-        from_axis = in_object.apply(link @ [case.radius, 0, -below])
-        np.testing.assert_allclose(found["on_link"], from_axis + case.radius * normal, atol=5e-3)
+        from_axis = in_object.apply(link @ [case.tip, 0, -below])
+        np.testing.assert_allclose(found["on_link"], from_axis + case.tip * normal, atol=5e-3)
 
 
 @pytest.mark.parametrize(("share", "outside"), [(0.5, 1), (0.5, -1), (1.0, 1), (1.0, -1)])
@@ -146,18 +147,18 @@ def test_surfaces_touch_where_normals_are_opposed(joints: int, share: float, out
     across = np.cross(end - start, rng.normal(size=3))
     across /= np.linalg.norm(across)
     case.point = start + share * (end - start) + thick * across
-    chain, link = PinFinger(case.finger, case.radius).chain(case.finger.angles[0])
+    chain, link = PinFinger(case.finger, case.standing).chain(case.finger.angles[0])
     link_normal = link @ [0.6, 0.8, 0]
     on_axis = chain[-2] + share * (chain[-1] - chain[-2])
     turn = Rotation.align_vectors([-outside * case.place.palm.apply(link_normal)], [across])[0]
     case.place.vector = (turn * case.place.reference.inv()).as_rotvec()
-    touched = case.place.palm.apply(on_axis + case.radius * link_normal) + case.place.palm_position
+    touched = case.place.palm.apply(on_axis + case.tip * link_normal) + case.place.palm_position
     case.place.position = touched - turn.apply(case.point)
     found = numbers(finger_kernels.contact(joints, Capsule, limited=True), *case.contact)
     np.testing.assert_allclose(found["on_object"], 0, atol=1e-5)
     # From within the object, the link's axis is a diameter away from where it should be.
     off = found["on_link"]
-    np.testing.assert_allclose(off, 0 if outside == 1 else 2 * case.radius * across, atol=5e-3)
+    np.testing.assert_allclose(off, 0 if outside == 1 else 2 * case.tip * across, atol=5e-3)
 
 
 @pytest.mark.parametrize("joints", [1, 2, 3])
@@ -217,7 +218,7 @@ def rolling_block(before: Knot, after: Knot) -> Block:
         point = turn.inv().apply(contact - position)
         knots |= {f"pose{i}": np.r_[position, turn.as_rotvec()], f"point{i}": point, f"angles{i}": angle}
         scenes |= {f"reference{i}": STILL, f"palm_position{i}": np.zeros(3), f"palm_quaternion{i}": STILL}
-        scenes |= {f"body{i}": [0, 0, 0, BALL], f"radius{i}": TIP, f"hinge{i}": 0.1}
+        scenes |= {f"body{i}": [0, 0, 0, BALL], f"radius{i}": 0.1, f"tip_radius{i}": TIP, f"hinge{i}": 0.1}
     across = np.cross(before[2] - before[0], [0, 1, 0])
     helper = before[1].inv().apply(across)
     parameters = {"frames": frames(UPRIGHT), **scenes, "helper": helper, "step": STEP}
@@ -283,18 +284,19 @@ def test_a_ball_that_turns_about_the_contact_s_normal_spins() -> None:
 # Clearance.
 
 
-RADIUS, PALM_RADIUS, GROUND = 0.1, 1.2, -0.4
+RADIUS, THICK, PALM_RADIUS, GROUND = 0.1, 0.17, 1.2, -0.4
+RADII = {"radius": RADIUS, "tip_radius": THICK}
 
 
 def clearance_block(finger: FingerSeed, place: Place, primitives: Array) -> Block:
-    parameters = {"radius": RADIUS, "palm_radius": PALM_RADIUS, "ground_height": GROUND, "bodies": primitives.ravel()}
+    parameters = {**RADII, "palm_radius": PALM_RADIUS, "ground_height": GROUND, "bodies": primitives.ravel()}
     variables = {**shape(finger), "pose": place.pose, "angles": finger.angles[0]}
     return variables, {"frames": frames(finger), **place.parameters, **parameters}
 
 
 def pair_block(one: FingerSeed, other: FingerSeed) -> Block:
     variables = {**shape(one, "0"), "angles0": one.angles[0], **shape(other, "1"), "angles1": other.angles[0]}
-    return variables, {"frames0": frames(one), "frames1": frames(other), "radius": RADIUS}
+    return variables, {"frames0": frames(one), "frames1": frames(other), **RADII}
 
 
 @pytest.mark.parametrize(("touched", "grounded"), [(None, False), (1, False), (None, True), (0, True)])
@@ -308,18 +310,21 @@ def test_clearances_of_a_finger_are_those_of_coal(touched: int | None, grounded:
         block = numbers(kernel, *clearance_block(finger, place, primitives))
         found = block["clear"]
         links = PinFinger(finger, RADIUS).links(finger.angles[0])
-        expected = [palm_apart(links[0][1], PALM_RADIUS) - RADIUS]
-        for start, end in links[1:]:
-            expected += [palm_apart(p, PALM_RADIUS) - RADIUS for p in ((start + end) / 2, end)]
-        expected.append(between(links[0], links[2], 2 * RADIUS))
+        # The last link is thicker, from its joint on.
+        middles = [(start + end) / 2 for start, end in links]
+        marks = [(links[0][1], RADIUS), (middles[1], RADIUS), (links[1][1], THICK)]
+        marks += [(middles[2], THICK), (links[2][1], THICK)]
+        expected = [palm_apart(p, PALM_RADIUS) - radius for p, radius in marks]
+        expected.append(between(links[0], links[2], RADIUS + THICK))
         if grounded:
             joints_and_tip = [links[0][0], *[end for _, end in links]]
             heights = [(place.palm.apply(p) + place.palm_position)[2] for p in joints_and_tip]
-            expected += [height - GROUND - RADIUS for height in heights]
+            radii = [RADIUS, RADIUS, THICK, THICK]
+            expected += [height - GROUND - radius for height, radius in zip(heights, radii, strict=True)]
         seen = [(place.in_palm(c[:3]), place.in_palm(c[3:6])) for c in primitives]
         for (i, link), k in itertools.product(enumerate(links), range(2)):
             if i < joints - 1 or k != touched:
-                expected.append(between(link, seen[k], RADIUS + primitives[k, 6]))
+                expected.append(between(link, seen[k], (THICK if i == joints - 1 else RADIUS) + primitives[k, 6]))
         # Never too small; parallel or crossing segments are rounded off.
         np.testing.assert_allclose(found, expected, atol=6e-3)
         assert np.median(np.abs(found - expected)) < 1e-4
@@ -332,7 +337,9 @@ def test_clearances_of_two_fingers_are_those_of_coal() -> None:
         one, other = random_finger(2, rng), random_finger(3, rng)
         found = numbers(finger_kernels.fingers_apart(2, 3), *pair_block(one, other))["clear"]
         links = [PinFinger(f, RADIUS).links(f.angles[0]) for f in (one, other)]
-        expected = [between(a, b, 0.2) for a, b in itertools.product(*links)]
+        thick = [[RADIUS, THICK], [RADIUS, RADIUS, THICK]]
+        pairs = itertools.product(*[list(zip(*each, strict=True)) for each in zip(links, thick, strict=True)])
+        expected = [between(a, b, radius + other) for (a, radius), (b, other) in pairs]
         np.testing.assert_allclose(found, expected, atol=6e-3)
         assert np.median(np.abs(found - expected)) < 1e-4
 

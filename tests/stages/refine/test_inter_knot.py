@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -16,7 +17,7 @@ from casadi_hands.stages.refine.settings import LAST_STEP
 from casadi_hands.stages.refine.stage import RefineStage
 from casadi_hands.stages.refine.values import Margin
 from tests.stages.blocks import coal_distance, segment
-from tests.stages.example import PinFinger, everything
+from tests.stages.example import PinFinger, everything, sizes_of, with_tips
 from tests.stages.refining import MadeUp
 
 Array = np.ndarray
@@ -30,21 +31,24 @@ def wide() -> MadeUp:
 
 def shallowest(made_up: MadeUp, angles: tuple[Array, Array]) -> float:
     """Least distance of the two fingers' surfaces between knots: in the middle, or at least every tenth of a second."""
-    radius, least = made_up.model.link_radius, np.inf
-    fingers = [PinFinger(finger, radius) for finger in made_up.start.fingers]
+    least = np.inf
+    radii = [sizes_of(made_up.model, finger.joints) for finger in made_up.start.fingers]
+    fingers = [PinFinger(finger, sizes[0]) for finger, sizes in zip(made_up.start.fingers, radii, strict=True)]
     for k, step in enumerate(np.diff(made_up.model.schedule.samples)):
         parts = next(n for n in range(2, 9) if step / n <= 0.1 + 1e-9)
         for homotopy in np.arange(1, parts) / parts:
             links = [f.links((1 - homotopy) * a[k] + homotopy * a[k + 1]) for f, a in zip(fingers, angles, strict=True)]
-            for one in links[0]:
-                for other in links[1]:
-                    least = min(least, coal_distance(segment(*one, radius), segment(*other, radius)))
+            bodies = [
+                [segment(*link, radius) for link, radius in zip(*each, strict=True)]
+                for each in zip(links, radii, strict=True)
+            ]
+            least = min([least, *(coal_distance(one, other) for one, other in itertools.product(*bodies))])
     return float(least)
 
 
 @pytest.mark.parametrize("step", [0.1, 0.3])
 def test_overlaps_between_knots_are_found_and_shallow_ones_are_not(step: float) -> None:
-    _, model = everything()
+    model = with_tips(everything()[1])
     made_up = MadeUp(resampled_model(model, model.schedule.stepped(step)), (0, 2), lifted={})
     structure, rng, found = made_up.stage.structure, np.random.default_rng(0), set()
     deep = -DEEP * made_up.model.link_radius

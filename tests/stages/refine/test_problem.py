@@ -13,7 +13,7 @@ from casadi_hands.stages.object_motion.values import tool_path
 from casadi_hands.stages.refine import finger_kernels
 from casadi_hands.stages.refine.settings import WEIGHTS
 from tests.stages.blocks import frames, numbers, surface
-from tests.stages.example import check_derivatives, doubling_each_weight, drawing, everything, rod
+from tests.stages.example import check_derivatives, doubling_each_weight, drawing, everything, rod, with_tips
 from tests.stages.refining import MadeUp, carrying, sketching
 
 Array = np.ndarray
@@ -162,8 +162,8 @@ def test_times_between_knots_divide_their_intervals_evenly() -> None:
 
 @pytest.fixture(scope="module")
 def wide() -> MadeUp:
-    """Fingers that lift for a while, on knots up to 0.3 s apart."""
-    _, model = everything()
+    """Fingers with thick tips that lift for a while, on knots up to 0.3 s apart."""
+    model = with_tips(everything()[1])
     return MadeUp(resampled_model(model, model.schedule.stepped(0.3)), (0, 2), lifted={2: (2, 4)}, guarded=True)
 
 
@@ -186,6 +186,7 @@ def test_forces_are_actuated_in_the_middle_between_knots_too(loaded: MadeUp) -> 
                 "palm_quaternion": turning(k + 0.5).as_quat(scalar_first=True),
                 "body": model.touched[c].parameters,
                 "radius": model.link_radius,
+                "tip_radius": model.tip_radius,
                 "hinge": model.hinge,
             }
             variables |= dict(zip(("pose", "point", "angles", "force"), middles, strict=True))
@@ -211,6 +212,7 @@ def test_lifted_fingers_are_clear_in_the_middle_between_knots_too(loaded: MadeUp
             "palm_position": (model.palm_position[k] + model.palm_position[k + 1]) / 2,
             "palm_quaternion": turning(k + 0.5).as_quat(scalar_first=True),
             "radius": model.link_radius,
+            "tip_radius": model.tip_radius,
             "palm_radius": model.palm_radius,
             "ground_height": model.ground_height,
             "bodies": packed(model.bodies),
@@ -231,7 +233,7 @@ def test_guarded_fingers_are_clear_of_each_other_every_tenth_of_a_second(loaded:
                 variables |= {f"{name}{tag}": values[f"{name}{c}"] for name in ("base", "lengths", "axes", "bends")}
                 variables[f"angles{tag}"] = (1 - share) * values[f"angles{c}"][k] + share * values[f"angles{c}"][k + 1]
                 parameters[f"frames{tag}"] = frames(wide.start.fingers[i])
-            parameters["radius"] = wide.model.link_radius
+            parameters |= {"radius": wide.model.link_radius, "tip_radius": wide.model.tip_radius}
             expected = numbers(finger_kernels.fingers_apart(2, 1), variables, parameters)
             np.testing.assert_allclose(next(rows), expected["clear"], atol=1e-12)
     assert next(rows, None) is None

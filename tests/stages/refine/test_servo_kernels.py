@@ -25,11 +25,16 @@ from tests.stages.blocks import Place, between, check_block, frames, numbers, ra
 from tests.stages.example import PinFinger, everything, everything_text, g, palm_apart
 
 Array = np.ndarray
-RADIUS, SERVO, PALM_RADIUS, GROUND, MARGIN = 0.1, 0.25, 1.2, -0.4, 0.03
+RADIUS, THICK, SERVO, PALM_RADIUS, GROUND, MARGIN = 0.1, 0.16, 0.25, 1.2, -0.4, 0.03
+
+
+def radii(finger: FingerSeed) -> list[float]:
+    return [*[RADIUS] * (finger.joints - 1), THICK]
 
 
 def placed(finger: FingerSeed) -> list[tuple[Array, Array]]:
-    return [(np.asarray(a), np.asarray(b)) for a, b in PinFinger(finger, RADIUS).links(finger.angles[0])]
+    standing = PinFinger(finger, radii(finger)[0])
+    return [(np.asarray(a), np.asarray(b)) for a, b in standing.links(finger.angles[0])]
 
 
 def expected_rest(finger: FingerSeed, seen: list[tuple[Array, Array, float]], heights: list[float]) -> list[float]:
@@ -38,8 +43,10 @@ def expected_rest(finger: FingerSeed, seen: list[tuple[Array, Array, float]], he
     joints = [start for start, _ in links]
     found = [between((at, at), (a, b), SERVO + radius) for at in joints for a, b, radius in seen]
     found += [palm_apart(at, PALM_RADIUS) - SERVO for at in joints[1:]]
+    bodies = list(zip(links, radii(finger), strict=True))
     for j, at in enumerate(joints):
-        found += [between((at, at), link, RADIUS + SERVO) for i, link in enumerate(links) if i not in (j - 1, j)]
+        away = [body for i, body in enumerate(bodies) if i not in (j - 1, j)]
+        found += [between((at, at), link, radius + SERVO) for link, radius in away]
         found += [float(np.linalg.norm(at - there)) - 2 * SERVO for there in joints[j + 2 :]]
     return [*found, *[height - SERVO for height in heights]]
 
@@ -67,8 +74,9 @@ def paid_for_servos(
 def expected_pair(one: FingerSeed, other: FingerSeed) -> list[float]:
     links = placed(one), placed(other)
     joints = [[start for start, _ in each] for each in links]
-    found = [between((at, at), link, RADIUS + SERVO) for at, link in itertools.product(joints[0], links[1])]
-    found += [between((at, at), link, RADIUS + SERVO) for at, link in itertools.product(joints[1], links[0])]
+    bodies = [list(zip(each, radii(f), strict=True)) for each, f in zip(links, (one, other), strict=True)]
+    found = [between((at, at), link, r + SERVO) for at, (link, r) in itertools.product(joints[0], bodies[1])]
+    found += [between((at, at), link, r + SERVO) for at, (link, r) in itertools.product(joints[1], bodies[0])]
     return found + [float(np.linalg.norm(a - b)) - 2 * SERVO for a, b in itertools.product(*joints)]
 
 
@@ -80,7 +88,13 @@ def test_servos_are_as_far_from_all_else_as_coal_says(joints: int, grounded: boo
         finger, place = random_finger(joints, rng), Place(rng)
         primitives = np.hstack([rng.normal(size=(2, 6)), [[0.2], [0.3]]])
         variables = {**shape(finger), "pose": place.pose, "angles": finger.angles[0]}
-        sizes = {"radius": RADIUS, "servo_radius": SERVO, "palm_radius": PALM_RADIUS, "ground_height": GROUND}
+        sizes = {
+            "radius": RADIUS,
+            "tip_radius": THICK,
+            "servo_radius": SERVO,
+            "palm_radius": PALM_RADIUS,
+            "ground_height": GROUND,
+        }
         parameters = {"frames": frames(finger), **place.parameters, **sizes, "bodies": primitives.ravel()}
         kernel = finger_kernels.apart(joints, (Capsule, Capsule), None, grounded, servos=True)
         plain = finger_kernels.apart(joints, (Capsule, Capsule), None, grounded)
@@ -101,7 +115,8 @@ def test_servos_of_two_fingers_are_as_far_apart_as_coal_says() -> None:
         rng = np.random.default_rng(seed)
         one, other = random_finger(2, rng), random_finger(3, rng)
         variables = {**shape(one, "0"), "angles0": one.angles[0], **shape(other, "1"), "angles1": other.angles[0]}
-        parameters = {"frames0": frames(one), "frames1": frames(other), "radius": RADIUS, "servo_radius": SERVO}
+        sizes = {"radius": RADIUS, "tip_radius": THICK, "servo_radius": SERVO}
+        parameters = {"frames0": frames(one), "frames1": frames(other), **sizes}
         kernel, due = finger_kernels.fingers_apart(2, 3, servos=True), expected_pair(one, other)
         plain = {name: value for name, value in parameters.items() if name != "servo_radius"}
         without = numbers(finger_kernels.fingers_apart(2, 3), variables, plain)["clear"]
@@ -116,7 +131,7 @@ def test_the_stages_before_pay_for_what_is_nearer_than_their_margin() -> None:
     rng = np.random.default_rng(4)
     one, other, place = random_finger(2, rng), random_finger(3, rng), Place(rng)
     primitives = np.hstack([rng.normal(size=(2, 6)), [[0.5], [0.6]]])
-    sizes = {"link_radius": RADIUS, "servo_radius": SERVO, "margin": MARGIN}
+    sizes = {"link_radius": RADIUS, "tip_radius": THICK, "servo_radius": SERVO, "margin": MARGIN}
     seen = [(c[:3], c[3:6], c[6]) for c in primitives]
     up = place.palm.inv().apply([0.0, 0.0, 1.0])
     heights = [up @ at - GROUND for at, _ in placed(other)]

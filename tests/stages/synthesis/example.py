@@ -51,7 +51,7 @@ def ball_target(squeeze: float = SQUEEZE) -> Target:
 
 def foot(target: Target) -> float:
     """Height of a finger's first joint, lengths."""
-    return STAND * target.link_radius
+    return STAND * target.model.link_radius
 
 
 def pointing(target: Target, contact: int, axes: list[list[float]]) -> FingerSeed:
@@ -61,7 +61,7 @@ def pointing(target: Target, contact: int, axes: list[list[float]]) -> FingerSee
     """
     joints = len(axes)
     x, y, z = target.points[0, contact]
-    lengths = np.full(joints, (z - foot(target) - target.link_radius) / joints)
+    lengths = np.full(joints, (z - foot(target) - target.model.link_radius) / joints)
     frames = []
     for axis in axes:
         unit = np.array(axis) / np.linalg.norm(axis)

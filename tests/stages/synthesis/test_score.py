@@ -58,9 +58,9 @@ def test_a_finger_that_can_supply_all_scores_nothing_one_that_cannot_its_share_o
         first, second = 0.6 * side, -1.2 * side
         seed.angles[:] = [first, second]
         # Out and back: the tip comes to stand over the base again, at the height of the contact.
-        height = still.points[0, 0, 2] - foot(still) - still.link_radius * np.cos(0.6)
+        height = still.points[0, 0, 2] - foot(still) - still.model.link_radius * np.cos(0.6)
         seed.lengths[:] = height / (2 * np.cos(0.6))
-        seed.base[1] -= still.link_radius * np.sin(0.6) * side
+        seed.base[1] -= still.model.link_radius * np.sin(0.6) * side
         seed.tips[:] = 0
     score = finger_scores(still, hand(able, (0, 1)))
     assert (score < 0.01).all()

@@ -42,7 +42,7 @@ def test_fingers_are_within_what_can_be_built(target: Target, joints: int) -> No
     low, high = target.joint_limits
     for trial in range(100):
         finger = draw(target, (5, trial), joints)
-        assert np.linalg.norm(finger.base) <= target.palm_radius - target.link_radius
+        assert np.linalg.norm(finger.base) <= target.palm_radius - target.model.link_radius
         assert ((shortest <= finger.lengths) & (finger.lengths <= longest)).all()
         assert ((low < finger.angles) & (finger.angles < high)).all()
         assert np.ptp(finger.angles, axis=0).max() == 0
@@ -91,7 +91,7 @@ def test_straight_seeds_with_free_axes_are_drawn_from_the_stream_as_ever(target:
     for trial in range(20):
         finger, rng = draw(free, (7, trial), 3), np.random.default_rng((7, trial))
         direction, distance = rng.uniform(0, 2 * np.pi), np.sqrt(rng.uniform())
-        reach = free.palm_radius - free.link_radius
+        reach = free.palm_radius - free.model.link_radius
         np.testing.assert_allclose(finger.base, reach * distance * np.array([np.cos(direction), np.sin(direction)]))
         away = free.points[:, 1].mean(axis=0) - np.append(finger.base, foot(free))
         lengths = rng.uniform(0.8, 1.6, 3) * np.linalg.norm(away) / 3
@@ -116,7 +116,7 @@ def test_bends_cover_their_disc_evenly(target: Target) -> None:
 
 def test_bases_cover_the_disc_and_axes_their_part_of_the_sphere_evenly(target: Target) -> None:
     fingers = [draw(target, (9, trial)) for trial in range(400)]
-    reach = target.palm_radius - target.link_radius
+    reach = target.palm_radius - target.model.link_radius
     shares = [(np.linalg.norm(f.base) / reach) ** 2 for f in fingers]
     heights = [(f.axis_vectors[0, 2] / target.model.axis_cosines[1] + 1) / 2 for f in fingers]
     assert kstest(shares, "uniform").pvalue > 0.01

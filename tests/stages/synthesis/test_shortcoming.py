@@ -30,7 +30,7 @@ def told(target: Target, made: Synthesised, contact: int, score: float) -> Reaso
 def test_above_the_palm_reach_is_the_links_and_the_tip_s_radius() -> None:
     target = with_links(0.75)
     np.testing.assert_allclose(
-        beyond_reach(target, 0, 2), 3 - foot(target) - (2 * 0.75 + target.link_radius), atol=1e-9
+        beyond_reach(target, 0, 2), 3 - foot(target) - (2 * 0.75 + target.model.link_radius), atol=1e-9
     )
     assert (beyond_reach(target, 0, 4) < 0).all()
 
@@ -39,11 +39,11 @@ def test_beside_the_palm_the_base_is_on_its_rim() -> None:
     target = with_links(0.75)
     # 4 from the axis, 2 outside a disc of radius 2; 1.5 above where fingers stand.
     target.points[-1, 1] = [2.4, -3.2, 1.5 + foot(target)]
-    assert beyond_reach(target, 1, 2)[-1] == pytest.approx(2.5 - 1.5 - target.link_radius)
+    assert beyond_reach(target, 1, 2)[-1] == pytest.approx(2.5 - 1.5 - target.model.link_radius)
     # The nearest place of a base, by search.
     rim = {"type": "ineq", "fun": lambda xy: target.palm_radius**2 - xy @ xy}
     nearest = minimize(lambda xy: np.hypot(np.linalg.norm(xy - [2.4, -3.2]), 1.5), [0.1, 0.1], constraints=[rim])
-    assert beyond_reach(target, 1, 2)[-1] == pytest.approx(nearest.fun - 1.5 - target.link_radius, abs=1e-5)
+    assert beyond_reach(target, 1, 2)[-1] == pytest.approx(nearest.fun - 1.5 - target.model.link_radius, abs=1e-5)
 
 
 def test_a_contact_counts_only_while_it_acts() -> None:
@@ -58,7 +58,7 @@ def test_a_contact_out_of_reach_is_named_with_its_goal_and_the_links() -> None:
     target.points[-1, 0, 2] = 4.0
     made = hand([pointing(target, 0, [[1, 0, 0]] * 2), pointing(target, 1, [[1, 0, 0]])], (0, 1))
     reason = told(target, made, 0, 60.0)
-    beyond = 30 * (4 - foot(target) - 1.5 - target.link_radius)
+    beyond = 30 * (4 - foot(target) - 1.5 - target.model.link_radius)
     assert reason.what == (
         f"finger 'left' cannot reach goal 2 (0.6 s) with 2 joints: its contact is {beyond:.1f} mm beyond links of "
         "at most 22.5 mm each"

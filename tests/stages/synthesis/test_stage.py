@@ -20,16 +20,20 @@ from tests.stages.example import (
     doubling_each_weight,
     everything,
     everything_text,
+    fingers_apart,
     folds_apart,
+    from_palm_and_self,
     g,
+    joints_and_tip,
     linear_at,
     made_up_finger,
     made_up_floating,
-    palm_apart,
     rods,
     segments_apart,
+    sizes_of,
     torques,
     unsupplied,
+    with_tips,
 )
 
 Array = np.ndarray
@@ -56,7 +60,8 @@ class Witness:
 
     def __init__(self, model: Model, target: Target, fingers: tuple[FingerSeed, ...]) -> None:
         self.model, self.target, self.fingers, self.deepest, self.folded = model, target, fingers, 0.0, 0.0
-        self.pins = [PinFinger(seed, model.link_radius) for seed in fingers]
+        self.radii = [sizes_of(model, seed.joints) for seed in fingers]
+        self.pins = [PinFinger(seed, sizes[0]) for seed, sizes in zip(fingers, self.radii, strict=True)]
         self.collision_times = np.unique(
             np.concatenate([np.linspace(a, b, 4) for a, b in zip(target.times[:-1], target.times[1:], strict=True)])
         )
@@ -89,7 +94,7 @@ class Witness:
 
     def on_tip(self, seed: FingerSeed, coordinates: Array) -> Array:
         """Along the cap by the coordinates' length, on down the cylinder."""
-        arc, radius = np.linalg.norm(coordinates), self.model.link_radius
+        arc, radius = np.linalg.norm(coordinates), self.model.tip_radius
         angle = min(arc / radius, np.pi / 2)
         side = np.append(coordinates / arc, 0) * radius * np.sin(angle)
         along = seed.lengths[-1] + radius * np.cos(angle) - max(arc - radius * np.pi / 2, 0)
@@ -97,10 +102,12 @@ class Witness:
 
     def build(self, total: dict[str, float], seed: FingerSeed) -> None:
         shortest, longest = self.model.link_length
+        least = np.full(seed.joints, shortest)
+        least[-1] = self.model.shortest_last
         total["length"] += (seed.lengths**2).sum()
         total["bend"] += (seed.bends**2).sum()
-        total["minimum_length"] += float((g(shortest - seed.lengths) + g(seed.lengths - longest)).sum())
-        edge = self.model.palm_radius - self.model.link_radius
+        total["minimum_length"] += float((g(least - seed.lengths) + g(seed.lengths - longest)).sum())
+        edge = self.model.palm_radius - sizes_of(self.model, seed.joints)[0]
         total["finger_base"] += float(g(np.linalg.norm(seed.base) - edge))
 
     def travel(self, total: dict[str, float], c: int, seed: FingerSeed, finger: PinFinger) -> None:
@@ -114,31 +121,27 @@ class Witness:
     def collision(self) -> float:
         model, total = self.model, 0.0
         bodies, up, ground = self.target.scene(self.collision_times)
-        radius = model.link_radius
         angles = [linear_at(self.target.times, seed.angles, self.collision_times) for seed in self.fingers]
         for t in range(len(self.collision_times)):
             links = [finger.links(a[t]) for finger, a in zip(self.pins, angles, strict=True)]
-            for chain in links:
-                points = [chain[0][1], *(p for a, b in chain[1:] for p in ((a + b) / 2, b))]
-                apart = [palm_apart(p, model.palm_radius) - radius for p in points]
-                apart += [up[t] @ p - ground[t] - radius for p in (chain[0][0], *(b for _, b in chain))]
-                apart += [
-                    segments_apart(*chain[i], *chain[j]) - 2 * radius
-                    for i in range(len(chain))
-                    for j in range(i + 2, len(chain))
-                ]
-                folds = folds_apart(chain, radius)
+            for chain, radii in zip(links, self.radii, strict=True):
+                apart = from_palm_and_self(chain, radii, model.palm_radius)
+                apart += [up[t] @ p - ground[t] - radius for p, radius in joints_and_tip(chain, radii)]
+                folds = folds_apart(chain, model.link_radius)
                 total += float(g(-np.array(folds)).sum())
                 self.folded = max([self.folded, *(-fold for fold in folds)])
                 for capsule in rods(self.model.bodies, bodies[t]):
-                    gaps = [segments_apart(*link, capsule[:3], capsule[3:6]) - radius - capsule[6] for link in chain]
+                    gaps = [
+                        segments_apart(*link, capsule[:3], capsule[3:6]) - radius - capsule[6]
+                        for link, radius in zip(chain, radii, strict=True)
+                    ]
                     apart += gaps[:-1]
                     total += float(g(-gaps[-1]))  # the last link may touch
                     self.deepest = max(self.deepest, -gaps[-1])
                 total += float(g(MARGIN - np.array(apart)).sum())
             for i in range(len(links)):
                 for j in range(i):
-                    between = [segments_apart(*a, *b) - 2 * radius for a in links[i] for b in links[j]]
+                    between = fingers_apart(links[i], self.radii[i], links[j], self.radii[j])
                     total += float(g(MARGIN - np.array(between)).sum())
         return total
 
@@ -148,7 +151,8 @@ class Case:
 
     def __init__(self) -> None:
         self.task: Task
-        self.task, self.model = everything()
+        self.task, model = everything()
+        self.model = with_tips(model)
         self.target = target_of(self.model, made_up_floating(self.model))
         self.stage = SynthesisStage(self.target, (0, 1, 2), JOINTS)
         self.fingers = tuple(

@@ -21,8 +21,11 @@ from tests.stages.example import (
     cone,
     doubling_each_weight,
     everything,
+    fingers_apart,
     folds_apart,
+    from_palm_and_self,
     g,
+    joints_and_tip,
     made_up_finger,
     made_up_values,
     marks,
@@ -30,9 +33,11 @@ from tests.stages.example import (
     project,
     rod,
     segments_apart,
+    sizes_of,
     spline_at,
     torques,
     unsupplied,
+    with_tips,
 )
 from tests.stages.object_motion.test_kernels import ALL_TERMS, WEIGHT_OF
 from tests.stages.object_motion.test_kernels import Witness as ObjectWitness
@@ -60,7 +65,8 @@ class Witness(ObjectWitness):
     def __init__(self, model: Model, values: dict[str, Array], fingers: tuple[FingerSeed, ...]) -> None:
         super().__init__(model, values)
         self.fingers, self.values, self.deepest, self.folded = fingers, values, 0.0, 0.0
-        self.pins = [PinFinger(seed, model.link_radius) for seed in fingers]
+        self.radii = [sizes_of(model, seed.joints) for seed in fingers]
+        self.pins = [PinFinger(seed, sizes[0]) for seed, sizes in zip(fingers, self.radii, strict=True)]
         self.palms = [self.palm_at(0), self.palm_at(-1)]
         self.objects = [self.motion.at(0), self.motion.at(-1)]
 
@@ -105,7 +111,7 @@ class Witness(ObjectWitness):
     def touch(self, total: dict[str, float], c: int) -> None:
         seed, finger, h = self.fingers[c], self.pins[c], self.schedule.step
         now, before = self.angles_at(c, 0), self.angles_at(c, -1)
-        tip = np.array([0, 0, self.model.hinge, 0, 0, seed.lengths[-1], self.model.link_radius])
+        tip = np.array([0, 0, self.model.hinge, 0, 0, seed.lengths[-1], self.model.tip_radius])
         for s in range(len(self.schedule.samples)):
             point, active, force = self.points[1][s, c], self.invariant[s, c], self.forces[""][s, c]
             size, touched = np.linalg.norm(force), self.in_palm(s, point)
@@ -131,31 +137,31 @@ class Witness(ObjectWitness):
             total["joint_limits"] += (np.maximum(now - high, 0) ** 2 + np.maximum(low - now, 0) ** 2).sum()
 
     def collision(self) -> float:
-        model, total, radius = self.model, 0.0, self.model.link_radius
+        model, total = self.model, 0.0
         angles = [self.angles_at(c, 0) for c in CONTACTS]
         for s in range(len(self.schedule.samples)):
             links = [finger.links(a[s]) for finger, a in zip(self.pins, angles, strict=True)]
             position, palm = self.palms[0][0][s], self.palms[0][1][s]
-            for chain in links:
-                points = [chain[0][1], *(p for a, b in chain[1:] for p in ((a + b) / 2, b))]
-                apart = [palm_apart(p, model.palm_radius) - radius for p in points]
-                joints = (chain[0][0], *(b for _, b in chain))
-                apart += [(palm.apply(p) + position)[2] - model.ground - radius for p in joints]
-                if len(chain) == 3:
-                    apart.append(segments_apart(*chain[0], *chain[2]) - 2 * radius)
-                folds = folds_apart(chain, radius)
+            for chain, radii in zip(links, self.radii, strict=True):
+                apart = from_palm_and_self(chain, radii, model.palm_radius)
+                heights = [((palm.apply(p) + position)[2], radius) for p, radius in joints_and_tip(chain, radii)]
+                apart += [height - model.ground - radius for height, radius in heights]
+                folds = folds_apart(chain, model.link_radius)
                 total += float(g(-np.array(folds)).sum())
                 self.folded = max([self.folded, *(-fold for fold in folds)])
                 for capsule in map(rod, model.bodies):
                     ends = (self.in_palm(s, capsule[:3]), self.in_palm(s, capsule[3:6]))
-                    gaps = [segments_apart(*link, *ends) - radius - capsule[6] for link in chain]
+                    gaps = [
+                        segments_apart(*link, *ends) - radius - capsule[6]
+                        for link, radius in zip(chain, radii, strict=True)
+                    ]
                     apart += gaps[:-1]
                     total += float(g(-gaps[-1]))
                     self.deepest = max(self.deepest, -gaps[-1])
                 total += float(g(MARGIN - np.array(apart)).sum())
             for i in range(3):
                 for j in range(i):
-                    between = [segments_apart(*a, *b) - 2 * radius for a in links[i] for b in links[j]]
+                    between = fingers_apart(links[i], self.radii[i], links[j], self.radii[j])
                     total += float(g(MARGIN - np.array(between)).sum())
         return total
 
@@ -165,7 +171,7 @@ class Case:
 
     def __init__(self, palm_moves: bool) -> None:
         self.task, model = everything()
-        self.model = replace(model, hinge=2.1 * model.link_radius)
+        self.model = with_tips(replace(model, hinge=2.1 * model.link_radius))
         self.stage = WholeHandStage(self.model, CONTACTS, JOINTS, palm_moves)
         self.fingers = tuple(made_up_finger(self.model, n, 1, *at) for n, *at in zip(JOINTS, SEEDS, BENDS, strict=True))
         self.fingers[1].bends[1] = FOLDED
