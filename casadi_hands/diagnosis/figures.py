@@ -119,7 +119,7 @@ _ADVICE = {
     "motors": "more motors (motors), wider ratios (hand.ratios) or another seed (--seed)",
     "unsupplied_force": "more joints (search.max_joints)",
     "disturbance_radius": "more fingers, or contacts farther apart",
-    "least_stiffness": "stiffer motors (actuator.stiffness), thicker links (hand.link_radius), or more fingers",
+    "least_stiffness": "stiffer motors (actuator.stiffness), larger fingertips (fingertip.radius) or more fingers",
     "bearing_force": "thicker links (hand.link_radius), a stronger material (hand.material) or a lighter object",
     "bearing_moment": "thicker or shorter links (hand.link_radius, hand.link_length) or a stronger material "
     "(hand.material)",

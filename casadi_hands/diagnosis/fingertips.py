@@ -73,7 +73,10 @@ def _in_each_other(model: Model, points: Array, normals: Array) -> Iterator[Find
         f"{mm(model, wide)} thick (2 × {_field(model)})"
     )
     radius = 0.49 * float(np.linalg.norm(points[i] - points[j])) * model.units.length
-    yield found(what, f"contacts farther apart, or {_field(model)} below {radius:.3g}", certain=apart < _APART * wide)
+    field = _field(model)
+    if model.tip_radius > model.link_radius > radius / model.units.length:
+        field += " and hand.link_radius"
+    yield found(what, f"contacts farther apart, or {field} below {radius:.3g}", certain=apart < _APART * wide)
 
 
 def _depth(task: Task, model: Model, turn: Array, place: Array, point: Array, normal: Array) -> tuple[float, str]:

@@ -10,7 +10,7 @@ import casadi as ca
 from casadi import SX
 
 from casadi_hands.geometry import clamp, norm
-from casadi_hands.kinematics import STAND, finger_kinematics
+from casadi_hands.kinematics import STAND, finger_kinematics, link_radii
 
 
 @dataclass(frozen=True)
@@ -34,36 +34,46 @@ class FingerSymbols:
         """Number of joints."""
         return int(self.lengths.numel())
 
-    def placed(self, angles: SX, radius: SX, point: SX | None = None) -> PlacedFinger:
+    def placed(self, angles: SX, radii: tuple[SX, SX], point: SX | None = None) -> PlacedFinger:
         """The finger at joint angles (n,).
 
         Args:
             angles: (n,) rad.
-            radius: of its first link, above which ``STAND`` tells where it stands.
+            radii: of its links, and of the last one.
             point: (3,) its contact, in the last link's frame.
         """
         function = finger_kinematics(self.joints)
         at = SX.zeros(3, 1) if point is None else point
-        base = ca.vertcat(self.base, STAND * radius)
+        each = link_radii(self.joints, *radii)
+        base = ca.vertcat(self.base, STAND * each[0])
         origins, rotations, tip, contact, jacobian = function(base, self.turns, self.axes, self.lengths, angles, at)
-        return PlacedFinger(origins, rotations, tip, contact, jacobian)
+        return PlacedFinger(origins, rotations, tip, contact, jacobian, each)
 
 
 @dataclass(frozen=True)
 class PlacedFinger:
-    """Forward kinematics, palm frame: joint origins (3, n), rotations (3, 3n), tip, contact (3,), Jacobian (3, n)."""
+    """Forward kinematics, palm frame: joint origins (3, n), rotations (3, 3n), tip, contact (3,), Jacobian (3, n).
+
+    ``radii`` are those of its n links.
+    """
 
     origins: SX
     rotations: SX
     tip: SX
     contact: SX
     jacobian: SX
+    radii: list[SX]
 
     @property
     def ends(self) -> list[tuple[SX, SX]]:
         """Both ends (3,) of each link's axis."""
         points = [self.origins[:, j] for j in range(self.origins.shape[1])] + [self.tip]
         return list(itertools.pairwise(points))
+
+    @property
+    def links(self) -> tuple[list[tuple[SX, SX]], list[SX]]:
+        """Both ends of each link's axis, and the links' radii."""
+        return self.ends, self.radii
 
     @property
     def tip_rotation(self) -> SX:

@@ -141,8 +141,8 @@ class Fingertip(Section):
 
     radius: Positive = Field(
         description="Radius of every finger's last link, which touches the object, m; at least hand.link_radius. Its "
-        "hinge is as much longer as it is thicker, hand.hinge_length × this / hand.link_radius, and so is the "
-        "shortest that it may be. Larger tips ask for less stiff joints.",
+        "body begins hand.hinge_length × fingertip.radius / hand.link_radius off its joint, and the shortest length "
+        "that it may have is as much longer. Larger tips ask for less stiff joints.",
         json_schema_extra={"default": "hand.link_radius"},
     )
     torsion: NonNegative = Field(

@@ -28,6 +28,21 @@ def test_fingertips_in_each_other(apart: float, certain: bool) -> None:
     assert seen(touches=pair(apart), more=f"hand: {{link_radius: {thinner}}}") == []
 
 
+def test_thick_fingertips_in_each_other_are_told_of_by_their_own_field() -> None:
+    # Links of 2 mm would have room.
+    assert seen(touches=pair(0.76), more="hand: {link_radius: 0.002}") == []
+    hand = "hand: {link_radius: 0.0015}\nfingertip: {radius: "
+    text, sure = told(seen(touches=pair(0.7), more=f"{hand}{TIP}}}"))
+    assert sure
+    assert "and fingertips are 6 mm thick (2 × fingertip.radius)" in text
+    name, thinner = text.rsplit(" ", 3)[1], float(text.rsplit(" ", 1)[1])
+    assert name == "fingertip.radius"
+    assert seen(touches=pair(0.7), more=f"{hand}{thinner}}}") == []
+    # Where links are too thick for it, too, they are named.
+    text, _ = told(seen(touches=pair(0.4), more=f"{hand}{TIP}}}"))
+    assert "fingertip.radius and hand.link_radius below 0.00" in text
+
+
 def test_fingertips_beside_each_other() -> None:
     assert seen(touches=pair(1.01), more=HAND) == []
 

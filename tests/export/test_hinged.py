@@ -32,21 +32,30 @@ LENGTHS = ((3 * RADIUS, 3 * RADIUS), (0.05, 3 * RADIUS), (3 * RADIUS, 0.04))
 BASES = ((0.055, 0.0), (-0.03, 0.05), (-0.03, -0.05))
 
 
-def hand(seed: int = 0) -> Hand:
-    """Three fingers of two links, bent at zero angle, that turn about axes across their links."""
-    rng = np.random.default_rng(seed)
+def hand(seed: int = 0, tip: float = RADIUS, joints: int = 2) -> Hand:
+    """Three fingers of some links, bent at zero angle, that turn about axes across their links.
 
-    def link(length: float) -> Link:
+    Args:
+        seed: of axes and bends.
+        tip: radius of the last links, m; where they are thicker, fingers stand farther apart.
+        joints: of each finger.
+    """
+    rng = np.random.default_rng(seed)
+    thick, spread = [*[RADIUS] * (joints - 1), tip], tip / RADIUS
+
+    def link(length: float, radius: float) -> Link:
         toward = rng.uniform(0, 2 * np.pi)
         bend = rng.uniform(-0.5, 0.5, 2).tolist()
-        return Link(length, RADIUS, (np.cos(toward), np.sin(toward), 0.0), (bend[0], bend[1]), HINGE)
+        hinge = HINGE * radius / RADIUS
+        axis = np.cos(toward), np.sin(toward), 0.0
+        return Link(length + hinge - HINGE, radius, axis, (bend[0], bend[1]), hinge)
 
     fingers = tuple(
-        Finger(name, (*base, 1.05 * RADIUS), tuple(map(link, lengths)))
-        for name, base, lengths in zip(("a", "b", "c"), BASES, LENGTHS, strict=True)
+        Finger(name, (x * spread, y * spread, 1.05 * thick[0]), tuple(map(link, lengths[-joints:], thick)))
+        for name, (x, y), lengths in zip(("a", "b", "c"), BASES, LENGTHS, strict=True)
     )
     limit = np.radians(150)
-    return Hand(PALM, THICK, fingers, -limit, limit, 1.0, 5.0, DENSITY)
+    return Hand(spread * PALM, THICK, fingers, -limit, limit, 1.0, 5.0, DENSITY)
 
 
 # Masses.
@@ -122,13 +131,14 @@ def drawn(built: Hand, kept: Callable[[list[float]], bool], count: int) -> list[
     while len(found) < count:
         angles = rng.uniform(built.joint_lower, built.joint_upper, built.degrees_of_freedom)
         turns, lowest = posed(built, angles)
-        if lowest > 1.05 * RADIUS and kept(turns):
+        # Ends of links keep as far off the palm as the links that meet there are thick.
+        if lowest > 1.05 * built.fingers[0].links[-1].radius and kept(turns):
             found.append(angles)
     return found
 
 
 def within(turns: list[float]) -> bool:
-    return max(turns) <= FOLD
+    return max(turns, default=0.0) <= FOLD
 
 
 def beyond(turns: list[float]) -> bool:
@@ -156,11 +166,14 @@ def open_scene(built: Hand) -> str:
     """The scene without what keeps neighbours from colliding, and told to look at parents and children."""
     motion = example_motion()
     row = np.zeros((len(motion.time), built.degrees_of_freedom))
-    motion = replace(motion, joint_angles=row, object_position=np.add(motion.object_position, [5.0, 0, 0]))
+    last = f"_link{len(built.fingers[0].links) - 1}"
+    links = tuple(link.replace("_link1", last) for link in motion.contact_link)
+    motion = replace(motion, joint_angles=row, joint_names=built.joint_names, contact_link=links)
+    motion = replace(motion, object_position=np.add(motion.object_position, [5.0, 0, 0]))
     root = ElementTree.fromstring(scene_mjcf(example_task(), built, motion))
     excluded = root.findall("contact/exclude")
     pairs = {frozenset((element.get("body1", ""), element.get("body2", ""))) for element in excluded}
-    assert pairs >= ALIKE | AT_PALM
+    assert pairs >= AT_PALM | (ALIKE if len(built.fingers[0].links) > 1 else set())
     root.remove(root.find("contact"))
     option = root.find("option")
     flag = option.find("flag")
@@ -168,20 +181,25 @@ def open_scene(built: Hand) -> str:
     return ElementTree.tostring(root, encoding="unicode")
 
 
+SIZES = pytest.mark.parametrize(("tip", "joints"), [(RADIUS, 2), (1.5 * RADIUS, 2), (2 * RADIUS, 2), (2 * RADIUS, 1)])
+
+
+@SIZES
 @pytest.mark.parametrize("seed", range(3))
-def test_no_bodies_of_the_hand_meet_in_mujoco_within_the_fold(seed: int) -> None:
-    built = hand(seed)
+def test_no_bodies_of_the_hand_meet_in_mujoco_within_the_fold(seed: int, tip: float, joints: int) -> None:
+    built = hand(seed, tip, joints)
     text = open_scene(built)
     for angles in drawn(built, within, 20):
         assert touching(text, built.joint_names, angles) == set(), np.degrees(angles)
-    # It would see them: folded sharper, all neighbours are in each other.
-    for angles in drawn(built, beyond, 5):
+    # It would see them: folded sharper, all neighbours of a kind are in each other.
+    for angles in drawn(built, beyond, 5) if tip == RADIUS else ():
         assert touching(text, built.joint_names, angles) >= ALIKE, posed(built, angles)
 
 
+@SIZES
 @pytest.mark.parametrize("seed", range(3))
-def test_no_bodies_of_the_hand_meet_in_coal_within_the_fold(seed: int) -> None:
-    built = hand(seed)
+def test_no_bodies_of_the_hand_meet_in_coal_within_the_fold(seed: int, tip: float, joints: int) -> None:
+    built = hand(seed, tip, joints)
     text = hand_urdf(built)
     model = pin.buildModelFromXML(text)
     shapes = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION)
@@ -210,15 +228,16 @@ def test_no_bodies_of_the_hand_meet_in_coal_within_the_fold(seed: int) -> None:
 
     for angles in drawn(built, within, 10):
         assert meeting(angles) == set(), np.degrees(angles)
-    for angles in drawn(built, beyond, 3):
+    for angles in drawn(built, beyond, 3) if tip == RADIUS else ():
         assert meeting(angles) >= ALIKE, posed(built, angles)
 
 
 # Looks.
 
 
-def test_tongue_and_pin_reach_from_the_joint_to_the_body_and_across_it() -> None:
-    built = hand(1)
+@pytest.mark.parametrize("tip", [RADIUS, 2 * RADIUS])
+def test_tongue_and_pin_reach_from_the_joint_to_the_body_and_across_it(tip: float) -> None:
+    built = hand(1, tip)
     root = ElementTree.fromstring(hand_urdf(built))
     for i, finger in enumerate(built.fingers):
         for j, link in enumerate(finger.links):
@@ -233,10 +252,13 @@ def test_tongue_and_pin_reach_from_the_joint_to_the_body_and_across_it() -> None
                 half = 0.5 * float(shape.get("length")) * Rotation.from_euler("xyz", rpy).as_matrix()[:, 2]
                 ends.append((middle - half, middle + half, float(shape.get("radius"))))
             (body, tongue, pin_) = ends
-            assert body[0] == pytest.approx([0, 0, HINGE], abs=1e-12)
+            hinge = HINGE * (tip / RADIUS if j else 1)
+            assert body[0] == pytest.approx([0, 0, hinge], abs=1e-12)
             assert body[1] == pytest.approx([0, 0, link.length], abs=1e-12)
             assert tongue[0] == pytest.approx(np.zeros(3), abs=1e-12)
-            assert tongue[1] == pytest.approx([0, 0, HINGE], abs=1e-12)
+            assert tongue[1] == pytest.approx([0, 0, hinge], abs=1e-12)
             assert np.cross(pin_[1] - pin_[0], link.axis) == pytest.approx(np.zeros(3), abs=1e-12)
             assert (pin_[0] + pin_[1]) == pytest.approx(np.zeros(3), abs=1e-12)
+            # Of a thick link, too, they fit into the one before.
             assert tongue[2] < RADIUS > pin_[2]
+            assert np.linalg.norm(pin_[1]) == pytest.approx(1.2 * RADIUS)

@@ -16,7 +16,7 @@ from casadi_hands.problem.outcome import whole_hand_motion
 from casadi_hands.problem.si import build_model, hand_of, joint_loads
 from casadi_hands.problem.units import round_off
 from casadi_hands.task import Task, parse_task
-from tests.stages.example import PinFinger, everything, everything_text
+from tests.stages.example import PinFinger, everything, everything_text, with_tips
 from tests.stages.refining import MadeUp, carrying, sketching
 
 KINDS = ("effort", "velocity")
@@ -139,3 +139,29 @@ def test_fingers_stand_on_the_palm_s_face(made_up: MadeUp) -> None:
 def test_numbers_of_any_size_are_rounded(value: float, rounded: float) -> None:
     assert round_off(value) == pytest.approx(rounded, rel=1e-14, abs=0.0)
     np.testing.assert_allclose(round_off([value, 1.0]), [rounded, 1.0], rtol=1e-14)
+
+
+def test_only_last_links_are_as_thick_as_fingertips_and_stand_for_it_where_they_are_first(made_up: MadeUp) -> None:
+    text = everything_text().replace("link_length: [0.012", "link_length: [0.02")
+    task = parse_task(text + "fingertip: {radius: 0.008}\n")
+    model = build_model(task)
+    hand = hand_of(task, model, made_up.start.fingers, made_up.start.contacts, 1.0, 1.0)
+    assert {len(finger.links) for finger in hand.fingers} == {1, 2}
+    hinge = task.hand.hinge_length
+    for finger in hand.fingers:
+        alone = len(finger.links) == 1
+        assert [link.radius for link in finger.links] == pytest.approx([0.006, 0.008][alone:])
+        assert [link.hinge for link in finger.links] == pytest.approx([hinge, hinge * 4 / 3][alone:])
+        assert finger.base[2] == pytest.approx(1.05 * (0.008 if alone else 0.006))
+
+
+def test_contacts_are_written_on_the_surface_of_a_thick_tip(made_up: MadeUp) -> None:
+    hand, _ = written(made_up)
+    model = with_tips(made_up.model)
+    motion = whole_hand_motion(model, hand)
+    for finger, contact in zip(hand.fingers, hand.contacts, strict=True):
+        column = motion.contact_names.index(model.contact_names[contact])
+        ends = [[0, 0, model.hinge], [0, 0, finger.lengths[-1]]]
+        for point in motion.contact_point_link[:, column] / model.units.length:
+            on_axis = np.array([0, 0, np.clip(point[2], ends[0][2], ends[1][2])])
+            assert np.linalg.norm(point - on_axis) == pytest.approx(model.tip_radius, abs=1e-6)

@@ -471,6 +471,22 @@ SPOILT = {
         "1: hand.hinge_length: given 0.04; allowed: 0, or at least 2.1 × link_radius (0.021) and less than the "
         "shortest link (0.04)",
     ),
+    "fingertip thinner than links": (
+        "name:",
+        "hand: {link_radius: 0.01}\nfingertip: {radius: 0.009}\nname:",
+        "2: fingertip.radius: given 0.009; allowed: at least hand.link_radius (0.01), that of the links behind it",
+    ),
+    "fingertip too thick for its link": (
+        "name:",
+        "hand: {link_radius: 0.01, link_length: [0.03, 0.051]}\nfingertip: {radius: 0.0201}\nname:",
+        "2: fingertip.radius: given 0.0201; allowed: at most 0.02, or longer links (hand.link_length): with its hinge "
+        "the last link is at least 0.05121 long, and links are at most 0.051",
+    ),
+    "fingertip of words": (
+        "name:",
+        "fingertip: {radius: wide}\nname:",
+        "1: fingertip.radius: given 'wide'; allowed: a number (without quotes or unit; lengths in m, ...",
+    ),
     "hinge of less than nothing": (
         "name:",
         "hand: {hinge_length: -0.01}\nname:",

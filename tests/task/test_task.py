@@ -65,6 +65,27 @@ def test_hinges_have_room_where_the_shortest_link_does(given: str, hinge: float)
     assert parse_task(task_to_yaml(task)) == task
 
 
+def test_fingertips_are_as_thick_as_links_unless_told_otherwise() -> None:
+    task = capsule()
+    assert task.fingertip.radius == task.hand.link_radius
+    assert (task.last_hinge, task.shortest_last) == (task.hand.hinge_length, task.hand.link_length[0])
+
+
+@pytest.mark.parametrize("hinge", [0.021, 0.0])
+def test_thick_fingertips_have_a_longer_hinge_and_twist_as_large_ones_do(hinge: float) -> None:
+    hand = f"hand: {{link_radius: 0.01, link_length: [0.03, 0.1], hinge_length: {hinge}}}\n"
+    task, thin = capsule(more=f"{hand}fingertip: {{radius: 0.015}}\n"), capsule(more=hand)
+    assert task.fingertip.torsion == pytest.approx(1.5 * thin.fingertip.torsion)
+    assert task.last_hinge == pytest.approx(1.5 * hinge)
+    # The body beyond the hinge is as long as before.
+    assert task.shortest_last - task.last_hinge == pytest.approx(0.03 - hinge)
+    assert task.hand == thin.hand
+    assert task.limits == thin.limits
+    assert parse_task(task_to_yaml(task)) == task
+    changed = thin.changed(fingertip={"radius": 0.015})
+    assert changed == task
+
+
 def test_force_unit_with_gravity_off() -> None:
     task = capsule().model_copy(update={"gravity": (0.0, 0.0, 0.0)})
     assert task.force_unit == pytest.approx(0.981)

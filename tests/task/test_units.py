@@ -82,6 +82,10 @@ def test_a_palm_far_from_its_object() -> None:
     [
         ("hand: {link_length: [20, 200]}", "hand.link_length: this is 200 m, for an object 0.044 m long; is the file"),
         ("hand: {link_radius: 3}", "hand.link_radius: this is 3 m, for an object 0.044 m long; is the file in milli"),
+        (
+            "hand: {link_length: [0.03, 9]}\nfingertip: {radius: 3}",
+            "fingertip.radius: this is 3 m, for an object 0.044 m long; is the file in milli",
+        ),
         ("hand: {joint_limits: [-1.57, 1.57]}", "hand.joint_limits: joints turn by 3.14°; are these radians?"),
         ("gravity: [0, 0, -9810]", "gravity: gravity of 9810 m/s²; is it in mm/s² or cm/s²?"),
         ("gravity: [0, 0, 9.81]", "gravity: gravity points up, and world z is up; is its sign wrong?"),

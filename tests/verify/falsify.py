@@ -244,7 +244,7 @@ def links_of(folder: Path, shortest: float, longest: float) -> None:
 
 def tipped(folder: Path, torsion: float) -> None:
     """Give the task fingertips of another torsional friction, m, and the scene likewise."""
-    task("fingertip: {torsion: 0.00108}", f"fingertip: {{torsion: {torsion}}}")(folder)
+    task("torsion: 0.00108}", f"torsion: {torsion}}}")(folder)
     edited(SCENE, ".//body//geom", lambda e, p: e.set("friction", f"0.9 {torsion} 0"), every=True)(folder)
 
 

@@ -300,7 +300,7 @@ motion:
 {goals}
 fingers: {{one: {{touches: {0}}}, two: {{touches: {1}}}, three: {{touches: {2}}}}}
 friction: 0.9
-hand: {{joint_limits: [-150, 150], link_radius: 0.006, hinge_length: {hinge}}}
+hand: {{joint_limits: [-150, 150], link_radius: {link}, hinge_length: {hinge}}}
 actuator: {{torque: 0.5, speed: 5}}
 limits: {{unsupplied_force: 10}}
 {fingertip}
@@ -314,6 +314,7 @@ def carried(
     hard: bool = False,
     bent: bool = False,
     hinge: float = 0.0,
+    link: float = TIP,
 ) -> Scene:
     """Three fingers of two joints, held stiff, and an object between them; the palm carries all along a free curve.
 
@@ -329,13 +330,15 @@ def carried(
         hard: whether fingertips are points, without moments.
         bent: whether links are bent at zero angle; they stand where straight ones do.
         hinge: from a joint to where its link's body begins, m; 0 where neighbours share a ball.
+        link: radius of first links, m; that of fingertips stays as it is.
     """
-    fingertip = "fingertip: {torsion: 0}" if hard else ""
+    tip = {"torsion": 0} if hard else {}
+    fingertip = f"fingertip: {tip if link == TIP else tip | {'radius': TIP}}"
     time, ends = np.linspace(0.0, 2.0, 21), [[0, 0, 0.28]] * 2
     places = [c.tolist() for c in CONTACTS]
     goals = _goals([0, 2], ends, [[1, 0, 0, 0]] * 2)
     sizes = SIZES.get(shape, "start: [0, 0, -0.03], end: [0, 0, 0.03], radius: 0.02")
-    given = {"shape": shape, "sizes": sizes, "fingertip": fingertip, "hinge": hinge}
+    given = {"shape": shape, "sizes": sizes, "fingertip": fingertip, "hinge": hinge, "link": link}
     task = read_task(directory, _TASK.format(*places, goals=goals, **given))
     moments = np.zeros((len(time), 3, 3)) if hard else _moments(time)
     forces, position, quaternion = _carrying(task, moments)
@@ -531,12 +534,13 @@ def _grasp(task: Task, bends: tuple[tuple[float, float], ...]) -> tuple[Hand, np
         tip = to_palm.apply(contact) + [0, 0, 0.08] + TIP * radial
         outer, inner = _lean(radial, out_angle), _lean(radial, in_angle)
         # Both lengths follow from where the tip is once the base is 38 mm from the palm's centre, on its face.
-        base = 0.038 * radial + [0.0, 0.0, STAND]
+        base = 0.038 * radial + [0.0, 0.0, 1.05 * float(task.hand.link_radius)]
         lengths = np.linalg.lstsq(np.column_stack([outer, inner]), tip - base, rcond=None)[0]
         axis, turn, links = np.cross([0, 0, 1], radial), Rotation.identity(), []
-        for length, way, bend in zip(lengths, (outer, inner), bends, strict=True):
+        thick = float(task.hand.link_radius), TIP
+        for length, way, bend, radius in zip(lengths, (outer, inner), bends, thick, strict=True):
             link, angle = _pointing(float(length), turn.apply(way, inverse=True), axis, np.deg2rad(bend))
-            link = replace(link, hinge=float(task.hand.hinge_length))
+            link = replace(link, radius=radius, hinge=float(task.hand.hinge_length) / thick[0] * radius)
             turn *= Rotation.from_rotvec([*link.bend, 0.0]) * Rotation.from_rotvec(angle * np.array(link.axis))
             links.append(link)
             angles.append(angle)

@@ -61,8 +61,8 @@ def pressing(joints: int, kind: type[Body], soft: bool, motors: int) -> Kernel:
     touch = scene.touch(pose, point, angles, symbols)
     # Where the force acts on the link: its own surface, which may be a little off the object's.
     from_axis = Segment(ca.vertcat(0, 0, scene.hinge), ca.vertcat(0, 0, symbols.lengths[-1])).offset(touch.on_link)
-    on_surface = touch.on_link - from_axis + scene.tip_radius * touch.link_normal
-    here = symbols.placed(angles, scene.standing(symbols), on_surface)
+    on_surface = touch.on_link - from_axis + scene.radii[1] * touch.link_normal
+    here = symbols.placed(angles, scene.radii, on_surface)
     torque = ca.mtimes(here.jacobian.T, ca.mtimes(touch.rotation, force))
     if soft:
         moment = kernel.parameter("torsion_radius") * kernel.variable("torsion", 1) * touch.normal

@@ -12,7 +12,6 @@ from casadi_hands.geometry import norm
 from casadi_hands.geometry.bodies import Body, Surface, surfaces, width_of
 from casadi_hands.geometry.bodies.capsule import Segment
 from casadi_hands.geometry.surface import path_between, tangents
-from casadi_hands.kinematics import link_radii
 from casadi_hands.kinematics.singularity import MARGIN_SIZES, singularity_margin
 from casadi_hands.kinematics.symbols import FingerSymbols, PlacedFinger, morphology, morphology_sizes
 from casadi_hands.motion import conjugate, derivative, rotation_matrix
@@ -65,8 +64,7 @@ class Scene:
     palm_position: SX
     palm_quaternion: SX
     body: Surface
-    radius: SX
-    tip_radius: SX
+    radii: tuple[SX, SX]
     hinge: SX
 
     @classmethod
@@ -81,12 +79,8 @@ class Scene:
             declared(n, k) for n, k in (("reference", 4), ("palm_position", 3), ("palm_quaternion", 4))
         )
         body = kind.surface(declared("body", kind.width))
-        sizes = (declared(each, 1) for each in ("radius", "tip_radius", "hinge"))
-        return cls(reference, position, quaternion, body, *sizes)
-
-    def standing(self, symbols: FingerSymbols) -> SX:
-        """Radius of the finger's first link, which stands on the palm."""
-        return link_radii(symbols.joints, self.radius, self.tip_radius)[0]
+        radii = declared("radius", 1), declared("tip_radius", 1)
+        return cls(reference, position, quaternion, body, radii, declared("hinge", 1))
 
     def touch(self, pose: SX, point: SX, angles: SX, symbols: FingerSymbols) -> Touch:
         """See a contact point (3,), object frame, from the object and from a finger's last link."""
@@ -94,15 +88,14 @@ class Scene:
         to_palm = rotation_matrix(conjugate(self.palm_quaternion))
         rotation = ca.mtimes(to_palm, rotation_matrix(quaternion))
         in_palm = ca.mtimes(rotation, point) + ca.mtimes(to_palm, position - self.palm_position)
-        standing = self.standing(symbols)
-        skeleton = symbols.placed(angles, standing)
+        skeleton = symbols.placed(angles, self.radii)
         on_link = ca.mtimes(skeleton.tip_rotation.T, in_palm - skeleton.origins[:, -1])
         off_object, normal = self.body.distance_and_normal(point, ROUNDING)
         axis = Segment(ca.vertcat(0, 0, self.hinge), ca.vertcat(0, 0, symbols.lengths[-1]))
         from_axis = axis.offset(on_link)
         from_link = ca.mtimes(rotation.T, ca.mtimes(skeleton.tip_rotation, from_axis))
-        off_link = from_link + self.tip_radius * normal
-        here = symbols.placed(angles, standing, on_link)
+        off_link = from_link + self.radii[1] * normal
+        here = symbols.placed(angles, self.radii, on_link)
         return Touch(on_link, off_object, off_link, normal, from_axis / norm(from_axis, ROUNDING), rotation, here)
 
 
@@ -238,23 +231,21 @@ def apart(
     reference, palm_position, palm_quaternion = (
         kernel.parameter(n, k) for n, k in (("reference", 4), ("palm_position", 3), ("palm_quaternion", 4))
     )
-    radius, tip_radius, palm_radius, ground = (
-        kernel.parameter(name) for name in ("radius", "tip_radius", "palm_radius", "ground_height")
-    )
-    radii = link_radii(joints, radius, tip_radius)
+    radii = kernel.parameter("radius"), kernel.parameter("tip_radius")
+    palm_radius, ground = kernel.parameter("palm_radius"), kernel.parameter("ground_height")
     bodies = surfaces(kinds, kernel.parameter("bodies", width_of(kinds)))
     position, quaternion = placed(pose, reference)
     to_palm = rotation_matrix(conjugate(palm_quaternion))
     rotation, center = ca.mtimes(to_palm, rotation_matrix(quaternion)), ca.mtimes(to_palm, position - palm_position)
     seen = [body.mapped(lambda point: ca.mtimes(rotation, point) + center) for body in bodies]
-    here = symbols.placed(angles, radii[0])
+    here = symbols.placed(angles, radii)
     up = to_palm[:, 2] if grounded else None
     servo = kernel.parameter("servo_radius") if servos else None
-    clear, last = distances(here, radii, palm_radius, seen, up, ground - palm_position[2], servo)
+    clear, last = distances(here, palm_radius, seen, up, ground - palm_position[2], servo)
     others = [last[k] for k in range(len(kinds)) if k != touched]
     kernel.constrain(limits.CLEAR, ca.vertcat(clear, *others))
     if joints > 1:
-        kernel.constrain(limits.UNFOLDED, clearance.unfolded(here.ends, radius))
+        kernel.constrain(limits.UNFOLDED, clearance.unfolded(here.ends, radii[0]))
     return kernel
 
 
@@ -266,12 +257,10 @@ def fingers_apart(joints: int, other_joints: int, servos: bool = False) -> Kerne
     angles = kernel.variable("angles0", joints, "angles", 0)
     second = free_morphology(kernel, other_joints, 1)
     other_angles = kernel.variable("angles1", other_joints, "angles", 1)
-    radius, tip_radius = kernel.parameter("radius"), kernel.parameter("tip_radius")
+    radii = kernel.parameter("radius"), kernel.parameter("tip_radius")
     servo = kernel.parameter("servo_radius") if servos else None
-    radii, other_radii = (link_radii(n, radius, tip_radius) for n in (joints, other_joints))
-    links = first.placed(angles, radii[0]).ends, radii
-    others = second.placed(other_angles, other_radii[0]).ends, other_radii
-    kernel.constrain(limits.CLEAR_OF_EACH_OTHER, clearance.two_fingers(links, others, servo))
+    links = first.placed(angles, radii).links, second.placed(other_angles, radii).links
+    kernel.constrain(limits.CLEAR_OF_EACH_OTHER, clearance.two_fingers(*links, servo))
     return kernel
 
 

@@ -222,8 +222,6 @@ class RefineValues:
             "inertial": model.units.inertial,
             "inertia": model.inertia.reshape(1, 9),
             "inverse": np.linalg.inv(model.inertia).reshape(1, 9),
-            "radius": model.link_radius,
-            "tip_radius": model.tip_radius,
             "hinge": model.hinge,
             "palm_radius": model.palm_radius,
             "ground_height": model.ground_height,
@@ -236,7 +234,7 @@ class RefineValues:
             "palm_quaternion_between": quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True),
             "wanted_pose": np.hstack([wanted.position, wanted.vector]),
         }
-        values |= self.proximity.idle
+        values |= self.proximity.idle | {"radius": model.link_radius, "tip_radius": model.tip_radius}
         if model.servo:
             values["servo_radius"] = model.servo
         values |= attached.parameters(model)

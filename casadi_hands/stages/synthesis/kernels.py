@@ -36,9 +36,8 @@ def follow(joints: int) -> Kernel:
             ("highest", 1),
         )
     )
-    radii = link_radii(joints, radius, tip_radius)
-    point, _ = tip_point(tip, symbols.lengths[-1], radii[-1])
-    placed = symbols.placed(angles, radii[0], point)
+    point, _ = tip_point(tip, symbols.lengths[-1], tip_radius)
+    placed = symbols.placed(angles, (radius, tip_radius), point)
     kernel.cost(finger.TIP_TARGET, active * (placed.contact - target))
     kernel.cost(finger.NULL_SPACE, active * finger.null_space(placed.jacobian, force))
     kernel.cost(finger.TORQUE, active * finger.joint_torques(placed.jacobian, force))
@@ -73,10 +72,9 @@ def collide(joints: int, kinds: tuple[type[Body], ...], servos: bool = False) ->
     radius, tip_radius, palm_radius, margin = (
         kernel.parameter(name) for name in ("link_radius", "tip_radius", "palm_radius", "margin")
     )
-    radii = link_radii(joints, radius, tip_radius)
     bodies = surfaces(kinds, kernel.parameter("bodies", width_of(kinds)))
     up, ground = kernel.parameter("up", 3), kernel.parameter("ground")
-    ends = symbols.placed(angles, radii[0]).ends
+    ends, radii = symbols.placed(angles, (radius, tip_radius)).links
     apart = [
         clearance.links_and_palm(ends, radii, palm_radius),
         clearance.links_and_ground(ends, radii, up, ground),
@@ -102,12 +100,10 @@ def keep_apart(joints: int, other_joints: int, servos: bool = False) -> Kernel:
     angles = kernel.variable("angles0", joints, "angles", 0)
     second = morphology(kernel.variable, other_frames, other_joints, 1)
     other_angles = kernel.variable("angles1", other_joints, "angles", 1)
-    radius, tip_radius, margin = (kernel.parameter(name) for name in ("link_radius", "tip_radius", "margin"))
-    radii, other_radii = (link_radii(n, radius, tip_radius) for n in (joints, other_joints))
-    links = first.placed(angles, radii[0]).ends, radii
-    others = second.placed(other_angles, other_radii[0]).ends, other_radii
+    radii, margin = (kernel.parameter("link_radius"), kernel.parameter("tip_radius")), kernel.parameter("margin")
+    links = first.placed(angles, radii).links, second.placed(other_angles, radii).links
     servo = kernel.parameter("servo_radius") if servos else None
-    kernel.cost(clearance.COLLISION, clearance.overlap(margin - clearance.two_fingers(links, others, servo)))
+    kernel.cost(clearance.COLLISION, clearance.overlap(margin - clearance.two_fingers(*links, servo)))
     return kernel
 
 
@@ -119,7 +115,7 @@ def travel(joints: int) -> Kernel:
     symbols = morphology(kernel.variable, frames, joints)
     # Wherever it stands: only how its tip moves counts.
     before, now, after = (
-        symbols.placed(kernel.variable(f"angles{i}", joints, "angles", i), ca.SX(0)).tip for i in range(3)
+        symbols.placed(kernel.variable(f"angles{i}", joints, "angles", i), (ca.SX(0), ca.SX(0))).tip for i in range(3)
     )
     acceleration = finger.tip_acceleration(before, now, after, kernel.parameter("idle_step"))
     kernel.cost(finger.FINGERTIP_ACCELERATION, acceleration)

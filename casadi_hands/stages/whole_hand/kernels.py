@@ -10,7 +10,6 @@ from casadi import SX
 
 from casadi_hands.geometry.bodies import Body, Surface, surfaces, width_of
 from casadi_hands.geometry.bodies.capsule import Segment
-from casadi_hands.kinematics import link_radii
 from casadi_hands.kinematics.symbols import FingerSymbols, PlacedFinger, morphology
 from casadi_hands.motion import rotation_matrix
 from casadi_hands.motion.pose import placed
@@ -40,21 +39,21 @@ def touch(joints: int, moves: bool) -> Kernel:
     radius, tip_radius, hinge, friction, sharpness, step = (
         kernel.parameter(n) for n in ("link_radius", "tip_radius", "hinge", "friction", "sharpness", "step")
     )
-    radii = link_radii(joints, radius, tip_radius)
+    radii = radius, tip_radius
     position, quaternion = placed(pose, reference)
     rotation = rotation_matrix(quaternion)
     in_palm = palm.sees(position + ca.mtimes(rotation, point))
-    skeleton = symbols.placed(angles, radii[0])
+    skeleton = symbols.placed(angles, radii)
     last = skeleton.origins[:, -1]
     on_link = ca.mtimes(skeleton.tip_rotation.T, in_palm - last)
-    here = symbols.placed(angles, radii[0], on_link)
-    link = Surface(Segment(ca.vertcat(0, 0, hinge), ca.vertcat(0, 0, symbols.lengths[-1])), radii[-1])
+    here = symbols.placed(angles, radii, on_link)
+    link = Surface(Segment(ca.vertcat(0, 0, hinge), ca.vertcat(0, 0, symbols.lengths[-1])), tip_radius)
     projection, normal = link.project(on_link)
     force_in_palm = palm.turned(ca.mtimes(rotation, force))
     kernel.cost(contact.CONTACT_ON_FINGER, contact.off_surface(force, invariant, on_link, projection))
     position_before, quaternion_before = placed(pose_before, reference)
     object_moved = in_palm - palm_before.sees(position_before + ca.mtimes(rotation_matrix(quaternion_before), point))
-    finger_moved = in_palm - symbols.placed(angles_before, radii[0], on_link).contact
+    finger_moved = in_palm - symbols.placed(angles_before, radii, on_link).contact
     kernel.cost(contact.SLIP_ON_FINGER, contact.slip(force, invariant, object_moved, finger_moved, step))
     cone = contact.friction_cone(force_in_palm, ca.mtimes(here.tip_rotation, normal), friction, sharpness)
     kernel.cost(contact.FRICTION_CONE_HAND, invariant * cone)
@@ -70,7 +69,7 @@ def move(joints: int) -> Kernel:
     angles = [kernel.variable(f"angles{i}", joints, "angles", i) for i in range(3)]
     symbols = given_morphology(kernel, joints)
     lowest, highest, step = kernel.parameter("lowest"), kernel.parameter("highest"), kernel.parameter("step")
-    before, now, after = (symbols.placed(a, SX(0)).tip for a in angles)  # wherever it stands
+    before, now, after = (symbols.placed(a, (SX(0), SX(0))).tip for a in angles)  # wherever it stands
     kernel.cost(finger.FINGER_ACCELERATION, finger.tip_acceleration(before, now, after, step))
     beyond = ca.vertcat(ca.fmax(angles[1] - highest, 0), ca.fmax(lowest - angles[1], 0))
     kernel.cost(finger.JOINT_LIMITS_SQUARED, beyond)
@@ -88,7 +87,6 @@ def object_clearance(joints: int, kinds: tuple[type[Body], ...], moves: bool, se
     radius, tip_radius, palm_radius, ground, margin = (
         kernel.parameter(name) for name in ("link_radius", "tip_radius", "palm_radius", "ground_height", "margin")
     )
-    radii = link_radii(joints, radius, tip_radius)
     bodies = surfaces(kinds, kernel.parameter("bodies", width_of(kinds)))
     position, quaternion = placed(pose, reference)
     rotation = rotation_matrix(quaternion)
@@ -97,10 +95,10 @@ def object_clearance(joints: int, kinds: tuple[type[Body], ...], moves: bool, se
         return palm.sees(position + ca.mtimes(rotation, point))
 
     in_palm = [body.mapped(seen) for body in bodies]
-    here = symbols.placed(angles, radii[0])
+    here = symbols.placed(angles, (radius, tip_radius))
     up = palm.turned(SX([0, 0, 1]))
     servo = kernel.parameter("servo_radius") if servos else None
-    apart, touching = distances(here, radii, palm_radius, in_palm, up, ground - palm.position[2], servo)
+    apart, touching = distances(here, palm_radius, in_palm, up, ground - palm.position[2], servo)
     folds = clearance.unfolded(here.ends, radius)
     kernel.cost(clearance.COLLISION, clearance.overlap(ca.vertcat(margin - apart, -touching, -folds)))
     return kernel
@@ -108,7 +106,6 @@ def object_clearance(joints: int, kinds: tuple[type[Body], ...], moves: bool, se
 
 def distances(
     here: PlacedFinger,
-    radii: Sequence[SX],
     palm_radius: SX,
     bodies: Sequence[Surface],
     up: SX | None,
@@ -119,7 +116,7 @@ def distances(
 
     Without a ground ``up`` is None, and so is ``servo``, the radius of a joint's ball with its servo, without these.
     """
-    ends = here.ends
+    ends, radii = here.links
     apart = [clearance.links_and_palm(ends, radii, palm_radius), clearance.links_of_one(ends, radii)]
     if up is not None:
         apart.append(clearance.links_and_ground(ends, radii, up, ground))
@@ -137,12 +134,10 @@ def finger_clearance(joints: int, other_joints: int, servos: bool = False) -> Ke
     angles = kernel.variable("angles0", joints, "angles", 0)
     other_angles = kernel.variable("angles1", other_joints, "angles", 1)
     first, second = given_morphology(kernel, joints, 0), given_morphology(kernel, other_joints, 1)
-    radius, tip_radius, margin = (kernel.parameter(name) for name in ("link_radius", "tip_radius", "margin"))
-    radii, other_radii = (link_radii(n, radius, tip_radius) for n in (joints, other_joints))
+    radii, margin = (kernel.parameter("link_radius"), kernel.parameter("tip_radius")), kernel.parameter("margin")
     servo = kernel.parameter("servo_radius") if servos else None
-    links = first.placed(angles, radii[0]).ends, radii
-    others = second.placed(other_angles, other_radii[0]).ends, other_radii
-    kernel.cost(clearance.COLLISION, clearance.overlap(margin - clearance.two_fingers(links, others, servo)))
+    links = first.placed(angles, radii).links, second.placed(other_angles, radii).links
+    kernel.cost(clearance.COLLISION, clearance.overlap(margin - clearance.two_fingers(*links, servo)))
     return kernel
 
 
