@@ -89,9 +89,9 @@ def build_model(task: Task, whole: bool = False) -> Model:
         exerted=exerted_of(task, units),
         link_radius=round_off(task.hand.link_radius / length),
         tip_radius=round_off(task.fingertip.radius / length),
-        hinge=round_off(task.last_hinge / length),
+        hinge=round_off(task.hand.hinge_of(task.fingertip.radius) / length),
         link_length=(round_off(task.hand.link_length[0] / length), round_off(task.hand.link_length[1] / length)),
-        shortest_last=round_off(task.shortest_last / length),
+        shortest_last=round_off(task.hand.shortest_of(task.fingertip.radius) / length),
         joint_limits=(math.radians(low), math.radians(high)),
         bend=math.radians(task.hand.bend),
         axis_cosines=_cosines(task.hand.axes.from_link),
@@ -176,7 +176,7 @@ def hand_of(
     built = []
     for finger, contact in zip(fingers, contacts, strict=True):
         radii = model.radii(finger.joints)
-        hinges = [task.hand.hinge_length] * (finger.joints - 1) + [task.last_hinge]
+        hinges = [task.hand.hinge_length] * (finger.joints - 1) + [task.hand.hinge_of(task.fingertip.radius)]
         links = tuple(
             Link(
                 float(part * length),

@@ -203,14 +203,15 @@ def _region(task: Task, name: str, region: Region) -> Iterator[Problem]:
 def _fingertips(task: Task) -> Iterator[Problem]:
     """Sizes of fingertips beside those of the links behind them."""
     radius, hand, path = task.fingertip.radius, task.hand, ("fingertip", "radius")
+    shortest = hand.shortest_of(radius)
     if radius < hand.link_radius * (1 - 1e-9):
         allowed = f"at least hand.link_radius ({hand.link_radius:.4g}), that of the links behind it"
         yield Problem(path, f"{radius:g}", allowed)
-    elif task.shortest_last > hand.link_length[1] * (1 + 1e-9):
+    elif shortest > hand.link_length[1] * (1 + 1e-9):
         most = hand.link_radius * (1 + (hand.link_length[1] - hand.link_length[0]) / hand.hinge_length)
         allowed = (
             f"at most {most:.4g}, or longer links (hand.link_length): with its hinge the last link is at least "
-            f"{task.shortest_last:.4g} long, and links are at most {hand.link_length[1]:.4g}"
+            f"{shortest:.4g} long, and links are at most {hand.link_length[1]:.4g}"
         )
         yield Problem(path, f"{radius:g}", allowed)
 

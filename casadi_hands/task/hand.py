@@ -231,6 +231,14 @@ class HandSpec(Section):
         json_schema_extra={"default": "0.02 × object's characteristic length"},
     )
 
+    def hinge_of(self, radius: float) -> float:
+        """From a joint to where the body of a link of a radius, m, begins: as many radii for thick ones as for thin."""
+        return self.hinge_length * (radius / self.link_radius)
+
+    def shortest_of(self, radius: float) -> float:
+        """The shortest that a link of a radius may be, m: with as long a body as the shortest of the others."""
+        return self.link_length[0] + (self.hinge_of(radius) - self.hinge_length)
+
     @field_validator("link_length")
     @classmethod
     def _lengths_in_order(cls, value: Pair) -> Pair:

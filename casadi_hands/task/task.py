@@ -240,16 +240,6 @@ class Task(Section):
         return all(finger.is_placed for finger in self.fingers.values())
 
     @property
-    def last_hinge(self) -> float:
-        """From the last joint of a finger to where its link's body begins, m: longer where the fingertip is thicker."""
-        return self.hand.hinge_length * (self.fingertip.radius / self.hand.link_radius)
-
-    @property
-    def shortest_last(self) -> float:
-        """The shortest that a finger's last link may be, m: with as long a body as the shortest of the others."""
-        return self.hand.link_length[0] + (self.last_hinge - self.hand.hinge_length)
-
-    @property
     def force_unit(self) -> float:
         """The unit of force, N, called a weight: the object's; with gravity off, what it would be at 9.81 m/s².
 

@@ -103,11 +103,14 @@ def test_a_place_that_no_finger_reaches() -> None:
     assert "its side faces to or from the palm, by 65° or more on average" in proposal.reason
 
 
-def test_the_ground_is_stayed_clear_of() -> None:
+@pytest.mark.parametrize("thicker", [1.0, 1.5])
+def test_the_ground_is_stayed_clear_of(thicker: float) -> None:
     task = load_task("problems/tabletop_rotation_overhead.yaml")
     asked = {name: {"touches": "anywhere"} for name in task.fingers}
     task = Task.model_validate(task.model_dump(by_alias=True, exclude_none=True) | {"fingers": asked})
-    radius = task.hand.link_radius
+    radius = thicker * task.hand.link_radius
+    tip = task.fingertip.model_copy(update={"radius": radius})
+    task = task.model_copy(update={"fingertip": tip})
     assert task.ground is not None
     for each in propose(task).sets:
         for point in each.points.values():

@@ -68,7 +68,8 @@ def test_hinges_have_room_where_the_shortest_link_does(given: str, hinge: float)
 def test_fingertips_are_as_thick_as_links_unless_told_otherwise() -> None:
     task = capsule()
     assert task.fingertip.radius == task.hand.link_radius
-    assert (task.last_hinge, task.shortest_last) == (task.hand.hinge_length, task.hand.link_length[0])
+    hand, radius = task.hand, task.fingertip.radius
+    assert (hand.hinge_of(radius), hand.shortest_of(radius)) == (hand.hinge_length, hand.link_length[0])
 
 
 @pytest.mark.parametrize("hinge", [0.021, 0.0])
@@ -76,9 +77,9 @@ def test_thick_fingertips_have_a_longer_hinge_and_twist_as_large_ones_do(hinge: 
     hand = f"hand: {{link_radius: 0.01, link_length: [0.03, 0.1], hinge_length: {hinge}}}\n"
     task, thin = capsule(more=f"{hand}fingertip: {{radius: 0.015}}\n"), capsule(more=hand)
     assert task.fingertip.torsion == pytest.approx(1.5 * thin.fingertip.torsion)
-    assert task.last_hinge == pytest.approx(1.5 * hinge)
+    assert task.hand.hinge_of(0.015) == pytest.approx(1.5 * hinge)
     # The body beyond the hinge is as long as before.
-    assert task.shortest_last - task.last_hinge == pytest.approx(0.03 - hinge)
+    assert task.hand.shortest_of(0.015) - task.hand.hinge_of(0.015) == pytest.approx(0.03 - hinge)
     assert task.hand == thin.hand
     assert task.limits == thin.limits
     assert parse_task(task_to_yaml(task)) == task

@@ -133,7 +133,7 @@ class _Search:
 
     def _crowded(self, patches: Array) -> bool:
         """Whether fingertips at these points are in each other."""
-        radius, fingers = self.model.link_radius, self.model.contacts
+        radius, fingers = self.model.tip_radius, self.model.contacts
         tips = [p + radius * self.model.touched[c].outward(p) for c, p in enumerate(patches[:fingers])]
         apart = [float(np.linalg.norm(a - b)) for i, a in enumerate(tips) for b in tips[:i]]
         return min(apart, default=np.inf) < 2 * radius + self.model.clearance
