@@ -67,7 +67,13 @@ HAND_AGAINST_TASK: Cases = {
         r"its joint in hand\.urdf is not at its base",
     ),
     "a finger that floats": (task("link_radius: 0.006", "link_radius: 0.003"), r"above the palm's face, not on it"),
-    "other link radii": (task("link_radius: 0.006", "link_radius: 0.007"), r"has a radius of 6 mm, the task 7 mm"),
+    "other link radii": (
+        both(
+            task("link_radius: 0.006", "link_radius: 0.007"),
+            task("fingertip: {radius: 0.006", "fingertip: {radius: 0.007"),
+        ),
+        r"finger 'one' \(link 0\) has a radius of 6 mm, the task 7 mm",
+    ),
     "shorter links only": (
         lambda folder: links_of(folder, 0.012, 0.05),
         r"finger 'one' \(link 1\) is 60\.11 mm long; the task allows 12 to 50 mm",

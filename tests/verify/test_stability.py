@@ -13,7 +13,6 @@ from scipy.linalg import eigh, null_space
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.problem.hand import Finger, Link
-from casadi_hands.task.hand import Fingertip
 from casadi_hands.verify.figures.stability import Mode, Stability
 from casadi_hands.verify.figures.stiffness import stability_figures
 from casadi_hands.verify.reading.folder import Folder, read_folder
@@ -256,7 +255,8 @@ def test_soft_fingertips_never_need_more_than_hard_ones(tmp_path: Path) -> None:
     scene = carried(tmp_path / "task", hard=True)
     needed = []
     for torsion in (0.0, 1e-4, 1e-3, 1e-2):
-        task = scene.task.model_copy(update={"fingertip": Fingertip(torsion=torsion)})
+        tip = scene.task.fingertip.model_copy(update={"torsion": torsion})
+        task = scene.task.model_copy(update={"fingertip": tip})
         folder = read_folder(replace(scene, task=task).write(tmp_path / str(torsion)))
         needed.append([mode.stiffness for mode in Stability(folder).modes()])
     for soft, hard in zip(needed[1:], needed[:-1], strict=True):

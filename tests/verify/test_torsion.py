@@ -11,7 +11,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.export.commands import joint_torques
-from casadi_hands.task.hand import Fingertip
 from casadi_hands.verify.audit import audit_files
 from casadi_hands.verify.figures.dynamics import sample_residual, shoot
 from casadi_hands.verify.figures.torsion import spin_rates, torsion_figures
@@ -226,7 +225,8 @@ def test_two_soft_fingertips_resist_every_small_wrench_and_two_hard_ones_no_spin
 def test_a_task_s_other_tips_are_other_limits(held: Scene, tmp_path: Path) -> None:
     use = []
     for torsion in (0.00108, 0.00216):
-        task = held.task.model_copy(update={"fingertip": Fingertip(torsion=torsion)})
+        tip = held.task.fingertip.model_copy(update={"torsion": torsion})
+        task = held.task.model_copy(update={"fingertip": tip})
         found = audit_files(replace(held, task=task).write(tmp_path / str(torsion)))
         assert found.figures["torsion_excess"].holds
         use.append(found.figures["torsion_use"].value)
