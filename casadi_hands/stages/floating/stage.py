@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from casadi_hands.motion import linear
 from casadi_hands.nlp import Options, Problem, Solution, Solver
 from casadi_hands.problem.floating_motion import Floating
 from casadi_hands.problem.model import Model, sizes
+from casadi_hands.problem.regrasp import Regrasp
 from casadi_hands.stages.floating.gait import ROLLED, farthest_turn, gait
 from casadi_hands.stages.floating.gate import least_squares_forces, passes_gate
 from casadi_hands.stages.floating.regrasp import limited_travel, planned_regrasp
@@ -50,14 +51,15 @@ def solve_floating(model: Model, weights: Mapping[str, float]) -> Floating:
     floating = FloatingStage(model).solve(weights)
     if model.regrasp is not None:  # as the task says
         return floating
-    regrasp = planned_regrasp(model, floating.pose)
-    if regrasp is None:
+    if planned_regrasp(model, floating.pose) is None:
         return floating
-    others = [limited_travel(model, floating.pose)]
-    walking = gait(model, floating.pose)
-    if walking is not None:
-        others.insert(0 if farthest_turn(model, floating.pose) > ROLLED else 1, walking)
-    for plan in (regrasp, *others):
+    others: list[Callable[[Model, Array], Regrasp | None]] = [limited_travel, gait]
+    if farthest_turn(model, floating.pose) > ROLLED:
+        others.reverse()
+    for planner in (planned_regrasp, *others):
+        plan = planner(model, floating.pose)
+        if plan is None:
+            continue
         replanned = FloatingStage(replace(model, regrasp=plan)).solve_regrasp(floating, weights)
         if replanned is not None:
             return replanned
