@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import io
+
 import numpy as np
 import pytest
+from rich.console import Console
 
+from casadi_hands.cli.task_summary import check_summary
 from casadi_hands.errors import TaskError
 from casadi_hands.problem.holds import shortened_task
 from casadi_hands.problem.si import build_model
@@ -93,3 +97,10 @@ def test_what_cannot_be_is_refused(regrasps: str, message: str) -> None:
 def test_only_fingers_that_touch_points_regrasp() -> None:
     with pytest.raises(TaskError, match=r"regrasps\[0\]\.touches: given after anywhere"):
         parse_task(ONCE.replace("[0.006, 0, 0.04]", "anywhere"))
+
+
+def test_the_summary_tells_of_them() -> None:
+    task = walk()
+    printed = io.StringIO()
+    Console(file=printed, width=400).print(check_summary(task)[0])
+    assert "lets go at 1 s, from 2 s at [6, 0, 0] mm, lets go at 6 s, from 7 s at [6, 0, -20] mm" in printed.getvalue()

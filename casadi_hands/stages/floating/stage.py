@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -38,7 +39,20 @@ BARRIERS: tuple[Options, ...] = (
 )
 # Where contacts travel less: an adaptive barrier grew and shrank there until its cap in three of eight tasks.
 LIMITED_TRAVEL: tuple[Options, ...] = (replace(OPTIONS, mu_init=1e-3), *BARRIERS)
-GAIT = tuple(replace(options, max_iter=1000) for options in LIMITED_TRAVEL)  # more happens in them
+
+
+class Kind(NamedTuple):
+    """A way to plan contacts that move on the object, and the barriers that such plans are solved with."""
+
+    name: str
+    planner: Callable[[Model, Array], Regrasp | None]
+    barriers: tuple[Options, ...]
+
+
+REGRASP = Kind("regrasp", planned_regrasp, BARRIERS)
+LIMITED = Kind("limited contact travel", limited_travel, LIMITED_TRAVEL)
+# More happens in a gait than in other motions.
+WALKING = Kind("gait", gait, tuple(replace(options, max_iter=1000) for options in LIMITED_TRAVEL))
 BROKEN = 1e-3  # violation of friction's cones: forces of zero meet them, so what leaves more has broken down
 
 
@@ -51,16 +65,15 @@ def solve_floating(model: Model, weights: Mapping[str, float]) -> Floating:
     floating = FloatingStage(model).solve(weights)
     if model.regrasp is not None:  # as the task says
         return floating
-    if planned_regrasp(model, floating.pose) is None:
+    first = planned_regrasp(model, floating.pose)
+    if first is None:
         return floating
-    others: list[Callable[[Model, Array], Regrasp | None]] = [limited_travel, gait]
-    if farthest_turn(model, floating.pose) > ROLLED:
-        others.reverse()
-    for planner in (planned_regrasp, *others):
-        plan = planner(model, floating.pose)
+    others = (LIMITED, WALKING) if farthest_turn(model, floating.pose) <= ROLLED else (WALKING, LIMITED)
+    for kind in (REGRASP, *others):
+        plan = first if kind is REGRASP else kind.planner(model, floating.pose)
         if plan is None:
             continue
-        replanned = FloatingStage(replace(model, regrasp=plan)).solve_regrasp(floating, weights)
+        replanned = FloatingStage(replace(model, regrasp=plan)).solve_planned(floating, weights, kind)
         if replanned is not None:
             return replanned
     return floating
@@ -135,7 +148,7 @@ class FloatingStage:
             model=self.model,
         )
 
-    def solve_regrasp(self, before: Floating, weights: Mapping[str, float]) -> Floating | None:
+    def solve_planned(self, before: Floating, weights: Mapping[str, float], kind: Kind) -> Floating | None:
         """Solve again with the model's planned regrasp, from the motion without it; None where it fails the gate."""
         assert self.model.regrasp is not None
         parameters = object_parameters(self.model) | term_weights(self.solver.problem, self.model, weights)
@@ -145,14 +158,10 @@ class FloatingStage:
         if flags.sum(axis=1).min() < least_contacts(self.model):
             return None
         lower, upper = self._bounds(flags, flags)
-        lifts = self.model.regrasp.lifted.sum()
-        what, barriers = ("regrasp", BARRIERS) if lifts else ("limited contact travel", LIMITED_TRAVEL)
-        if lifts > self.model.contacts:
-            what, barriers = "gait", GAIT
-        solution = self._solved({**start, "invariant": flags}, parameters, lower, upper, barriers)
+        solution = self._solved({**start, "invariant": flags}, parameters, lower, upper, kind.barriers)
         if not passes_gate(self.model, solution.values, pivots=True):
             return None
-        return self._like(before, flags, solution, (*before.runs, (what, solution)))
+        return self._like(before, flags, solution, (*before.runs, (kind.name, solution)))
 
     def solve_as(self, other: Floating, weights: Mapping[str, float]) -> Floating:
         """Solve for another task's motion of the same object, with the contacts active that are in a given one."""

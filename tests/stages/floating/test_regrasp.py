@@ -12,12 +12,21 @@ from scipy.spatial.transform import Rotation
 
 from casadi_hands.problem.model import Model, sampled_points
 from casadi_hands.problem.regrasp import Regrasp
+from casadi_hands.problem.resampling import shortened
 from casadi_hands.problem.si import build_model
 from casadi_hands.stages.floating import stage as floating_stage
 from casadi_hands.stages.floating.gate import passes_gate
 from casadi_hands.stages.floating.regrasp import FARTHEST, limited_travel, planned_regrasp
-from casadi_hands.stages.floating.stage import BARRIERS, LIMITED_TRAVEL, FloatingStage, solve_floating
-from casadi_hands.stages.object_motion.values import straight_path
+from casadi_hands.stages.floating.stage import (
+    BARRIERS,
+    LIMITED,
+    LIMITED_TRAVEL,
+    REGRASP,
+    WALKING,
+    FloatingStage,
+    solve_floating,
+)
+from casadi_hands.stages.object_motion.values import REGRASP_ROOM, landing_bounds, point_bounds, straight_path
 from casadi_hands.task import parse_task
 from tests.stages.example import made_up_solution, rod
 
@@ -124,11 +133,12 @@ def test_contacts_held_back_are_solved_with_a_small_barrier_first_and_a_regrasp_
     before.solution = made_up_solution({})
     monkeypatch.setattr(FloatingStage, "_solved", lambda self, *given: used.append(given[-1]) or before.solution)
     monkeypatch.setattr(floating_stage, "passes_gate", lambda *_, **__: False)
-    for lifted in (False, True):
+    for kind in (LIMITED, REGRASP, WALKING):
         plan = limited_travel(model, before.pose)
-        plan.lifted[3, 0] = lifted
-        assert FloatingStage(replace(model, regrasp=plan)).solve_regrasp(before, parse_task_weights()) is None
-    assert used == [LIMITED_TRAVEL, BARRIERS]
+        plan.lifted[3, 0] = kind is not LIMITED
+        assert FloatingStage(replace(model, regrasp=plan)).solve_planned(before, parse_task_weights(), kind) is None
+    assert used[:2] == [LIMITED_TRAVEL, BARRIERS]
+    assert [replace(each, max_iter=300) for each in used[2]] == list(LIMITED_TRAVEL)
     assert LIMITED_TRAVEL[0].mu_init < min(barrier.mu_init for barrier in BARRIERS)
     assert LIMITED_TRAVEL[1:] == BARRIERS
 
@@ -204,3 +214,49 @@ def parse_task_weights() -> dict[str, float]:
     from casadi_hands.task.weights import Weights
 
     return dict(Weights().floating)
+
+
+WALK = """
+object: {mass: 0.03, shapes: [{capsule: {start: [0, 0, -0.05], end: [0, 0, 0.05], radius: 0.006}}]}
+palm: {radius: 0.045, position: [0, 0, 0.11], facing: [0, 0, -1]}
+motion:
+  - {at: 0, position: [0, 0, 0]}
+  - {at: 4, position: [0, 0, 0]}
+fingers:
+  east: {touches: [0.006, 0, 0.04], regrasps: [{from: 1, to: 2, touches: [0.006, 0, 0.01]}]}
+  west: {touches: [-0.006, 0, 0.04], regrasps: [{from: 1, to: 2, touches: [-0.006, 0, 0.01]}]}
+  north: {touches: [0, 0.006, 0.04]}
+  south: {touches: [0, -0.006, 0.04]}
+friction: 0.8
+"""
+
+
+def test_fingers_let_go_and_touch_again_as_the_task_asks() -> None:
+    model = build_model(parse_task(WALK))
+    floating = solve_floating(model, parse_task_weights())
+    times, away = model.schedule.keyframes, slice(None, 2)
+    lifted = (times > 1 - 1e-9) & (times < 2 - 1e-9)
+    np.testing.assert_array_equal(floating.active[:, away], ~np.tile(lifted[:, None], (1, 2)))
+    heights = floating.point[:, away, 2] * model.units.length
+    due = np.where(times < 2 - 1e-9, 0.04, 0.01)[:, None]
+    assert np.abs(heights - due).max() < REGRASP_ROOM * model.units.length + 1e-6
+    # The others carry the weight alone meanwhile.
+    at = (model.schedule.samples > 1 + 1e-9) & (model.schedule.samples < 2 - 1e-9)
+    assert floating.force[at][:, 2:, 2].sum(axis=1).min() > 0.9
+    # A part of the way keeps what the task asks for, and no other plan.
+    assert shortened(model, 0.5).regrasp is model.regrasp
+    assert shortened(replace(model, regrasp=Regrasp(lifted[:, None], model.keyframe_patches)), 0.5).regrasp is None
+
+
+def test_points_are_bounded_where_fingers_are_asked_to_touch_again() -> None:
+    model = build_model(parse_task(WALK))
+    low, high = (each.reshape(-1, 2, 3) for each in landing_bounds(model, (0, 2)))
+    landing = np.searchsorted(model.schedule.samples, 2 - 1e-9)
+    assert [tuple(map(int, each)) for each in np.argwhere(np.isfinite(high).all(axis=2))] == [(landing, 0)]
+    point = np.array([0.006, 0, 0.01]) / model.units.length
+    np.testing.assert_allclose(high[landing, 0], point + REGRASP_ROOM)
+    np.testing.assert_allclose(low[landing, 0], point - REGRASP_ROOM)
+    assert not np.isfinite(landing_bounds(replace(model, regrasp=None), (0, 2))).any()
+    keyframes = point_bounds(model)[1].reshape(-1, 4, 3)
+    assert np.isfinite(keyframes[:, :2]).all()
+    assert not np.isfinite(keyframes[:, 2:]).any()
