@@ -17,6 +17,7 @@ from casadi_hands.stages.own_terms import own_values
 Array = NDArray[np.float64]
 GOAL_TOLERANCE = 5e-4  # lengths and rad, each coordinate: the task's cost alone gives way to slow accelerations
 REGRASP_ROOM = 0.15  # lengths about its patches, for a contact that is regrasped
+LANDING_ROOM = 0.11  # lengths, each coordinate, about where the task has a finger touch again: the audit allows 0.2
 MOST_TURN = 5.6  # rad, up to where the exponential map's coordinates are used where goals do not turn farther
 
 
@@ -99,7 +100,7 @@ def landing_bounds(model: Model, contacts: Sequence[int]) -> tuple[Array, Array]
         lifted, patches = model.regrasp.lifted[:, chosen], model.regrasp.patches[:, chosen]
         k, c = np.nonzero(lifted[:-1] & ~lifted[1:])
         at = model.schedule.keyframe_samples[k + 1]
-        low[at, c], high[at, c] = patches[k + 1, c] - REGRASP_ROOM, patches[k + 1, c] + REGRASP_ROOM
+        low[at, c], high[at, c] = patches[k + 1, c] - LANDING_ROOM, patches[k + 1, c] + LANDING_ROOM
     return low.reshape(samples, -1), high.reshape(samples, -1)
 
 

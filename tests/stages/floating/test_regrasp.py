@@ -26,8 +26,15 @@ from casadi_hands.stages.floating.stage import (
     FloatingStage,
     solve_floating,
 )
-from casadi_hands.stages.object_motion.values import REGRASP_ROOM, landing_bounds, point_bounds, straight_path
+from casadi_hands.stages.object_motion.values import (
+    LANDING_ROOM,
+    REGRASP_ROOM,
+    landing_bounds,
+    point_bounds,
+    straight_path,
+)
 from casadi_hands.task import parse_task
+from casadi_hands.verify.checks.motion import NEAR
 from tests.stages.example import made_up_solution, rod
 
 Array = np.ndarray
@@ -254,8 +261,9 @@ def test_points_are_bounded_where_fingers_are_asked_to_touch_again() -> None:
     landing = np.searchsorted(model.schedule.samples, 2 - 1e-9)
     assert [tuple(map(int, each)) for each in np.argwhere(np.isfinite(high).all(axis=2))] == [(landing, 0)]
     point = np.array([0.006, 0, 0.01]) / model.units.length
-    np.testing.assert_allclose(high[landing, 0], point + REGRASP_ROOM)
-    np.testing.assert_allclose(low[landing, 0], point - REGRASP_ROOM)
+    np.testing.assert_allclose(high[landing, 0], point + LANDING_ROOM)
+    np.testing.assert_allclose(low[landing, 0], point - LANDING_ROOM)
+    assert np.sqrt(3) * LANDING_ROOM < NEAR
     assert not np.isfinite(landing_bounds(replace(model, regrasp=None), (0, 2))).any()
     keyframes = point_bounds(model)[1].reshape(-1, 4, 3)
     assert np.isfinite(keyframes[:, :2]).all()
