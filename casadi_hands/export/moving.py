@@ -35,7 +35,7 @@ _EXCHANGE = 2  # RENAME_EXCHANGE of Linux, RENAME_SWAP of macOS
 
 
 def replace_file(path: Path, write: Callable[[Path], object]) -> None:
-    """Write one file so that whoever reads it finds the old one or the new one, whole.
+    """Write one file so that whoever reads it finds the old one or the new one, whole, with the rights it had.
 
     Args:
         path: the file.
@@ -47,6 +47,8 @@ def replace_file(path: Path, write: Callable[[Path], object]) -> None:
     made = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         write(made)
+        if path.exists():
+            shutil.copymode(path, made)
         to_disk(made)
         os.replace(made, path)
     finally:

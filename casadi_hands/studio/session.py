@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from casadi_hands.errors import TaskError
+from casadi_hands.export.moving import replace_file
 from casadi_hands.studio.understood import understand
 from casadi_hands.task.starter import Idea, starter
 from casadi_hands.task.textfile import read
@@ -75,7 +76,7 @@ class Session:
             )
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self.path.write_text(self.text, encoding="utf-8", newline="\n")
+            replace_file(self.path.resolve(), lambda path: path.write_text(self.text, encoding="utf-8", newline="\n"))
         except OSError as error:
             raise TaskError(f"{self.path}: cannot be written: {error.strerror}; give a path that can") from None
         self._saved = self.text

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import difflib
+import os
+import stat
 
 import numpy as np
 import pytest
@@ -210,6 +212,24 @@ def test_what_another_program_wrote_is_not_overwritten_unasked(tmp_path):
     edited.undo()
     edited.save()
     assert load_task(edited.path).friction == 0.7
+
+
+def test_a_file_is_saved_whole_where_its_link_leads_and_with_the_rights_it_had(tmp_path, monkeypatch):
+    real = tmp_path / "real.yaml"
+    real.write_text(CAPSULE, encoding="utf-8")
+    real.chmod(0o640)
+    link = tmp_path / "task.yaml"
+    link.symlink_to(real)
+    edited = Session(link)
+    edited.edit(lambda text: with_value(text, ("friction",), 0.7))
+    seen = []
+    monkeypatch.setattr(os, "replace", lambda made, path: (seen.append(real.read_text()), os.rename(made, path)))
+    edited.save()
+    assert seen == [CAPSULE]  # until all of the new one is there
+    assert link.is_symlink()
+    assert load_task(real).friction == 0.7
+    assert stat.S_IMODE(real.stat().st_mode) == 0o640
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["real.yaml", "task.yaml"]
 
 
 def all_fields(form):
