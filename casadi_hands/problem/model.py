@@ -17,6 +17,7 @@ from casadi_hands.problem.exerted import Exerted
 from casadi_hands.problem.palm_path import PalmPath
 from casadi_hands.problem.regrasp import Regrasp
 from casadi_hands.problem.scenario import Scenario
+from casadi_hands.problem.strength import Strength
 from casadi_hands.problem.units import Units
 from casadi_hands.terms.own import OwnTerm
 
@@ -69,6 +70,7 @@ class Model:
         regrasp: planned, or None where fingers stay where they touch.
         motors: that turn all joints; 0 where each joint has one of its own.
         ratios: the smallest and the largest size of a joint's ratio to such a motor, where it is not zero.
+        strength: what fingers are held to bear, or None where that is left to the audit.
         own_terms: costs and constraints that a person adds to those of the stages.
     """
 
@@ -112,6 +114,7 @@ class Model:
     attachment: Attachment | None = None
     motors: int = 0
     ratios: tuple[float, float] = (0.1, 2.0)
+    strength: Strength | None = None
     own_terms: tuple[OwnTerm, ...] = ()
 
     def radii(self, joints: int) -> list[float]:

@@ -55,6 +55,16 @@ AXIS_FROM_LINK = Constraint(
 )
 BENT = Constraint("bent", "squared angle of the bend", "rad²", "be bent no further", "a larger hand.bend")
 
+# What a finger bears, each as a square over its limit's.
+_THICKER = "thicker or shorter links (hand.link_radius, hand.link_length) or a stronger material (hand.material)"
+BEARING = Constraint(
+    "bearing", "moment across a joint's axis", "", "grip so with its bearings", _THICKER, ("bearing_moment",)
+)
+STRESS = Constraint("stress", "√(σ² + 3 τ²) in a link", "", "grip so with its links", _THICKER, ("link_stress",))
+DEFLECTION = Constraint(
+    "deflection", "∫ M/(E I) s ds", "", "grip so without bending away", _THICKER, ("tip_deflection",)
+)
+
 # A finger's contact.
 ON_OBJECT = Constraint(
     "on_object", "eq. 2.10 as an equation", "length", "stay on the object's surface", _REACH, (*_GAP, *_BALANCE, "slip")

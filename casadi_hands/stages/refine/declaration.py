@@ -132,6 +132,8 @@ class Declaration:
             problem.parameter("cone_friction", (1, 1), quantity="friction")
         if structure.model.motors:
             widths |= {"stiffness": 1}
+        if structure.model.strength:
+            widths |= dict.fromkeys(structure.model.strength.parameters, 1)
         if structure.model.attachment is not None:
             widths |= JOINT_SIZES
         for name, width in widths.items():

@@ -12,6 +12,7 @@ from casadi_hands.stages.refine.finger_binding import bind_clearance, bind_conta
 from casadi_hands.stages.refine.object_binding import bind_ground, bind_object, bind_physics
 from casadi_hands.stages.refine.restoration import Proximity
 from casadi_hands.stages.refine.sliding import bind as bind_sliding
+from casadi_hands.stages.refine.strength import bind as bind_strength
 from casadi_hands.stages.refine.torsion import bind as bind_torsion
 
 
@@ -42,6 +43,8 @@ class RefineProblem(Declaration):
             bind_rolling(self, i)
             bind_clearance(self, i)
             bind_shape(self, i)
+            if structure.model.strength:
+                bind_strength(self, i)
             for j in range(i):
                 bind_pair(self, i, j, guarded)
         self._bind_own()

@@ -237,7 +237,7 @@ class RefineValues:
         values |= self.proximity.idle | {"radius": model.link_radius, "tip_radius": model.tip_radius}
         if model.servo:
             values["servo_radius"] = model.servo
-        values |= attached.parameters(model)
+        values |= attached.parameters(model) | (model.strength.parameters if model.strength else {})
         if model.torsion:
             values |= {"torsion_radius": model.torsion, "sliding_friction": model.friction}
             values["spin_scale"] = self._spin_scale
