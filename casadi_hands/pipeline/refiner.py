@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from casadi_hands.diagnosis.reason import Reason
 from casadi_hands.diagnosis.refinement import own_reasons, refined_reason
 from casadi_hands.export.design import Design
+from casadi_hands.pipeline.halving import BETWEEN, excess, intervals_to_halve
 from casadi_hands.pipeline.judge import STRAINED, Judge
 from casadi_hands.pipeline.margins import SMALL, margins_for
 from casadi_hands.pipeline.rank import AIM, rank_of
@@ -22,21 +23,20 @@ from casadi_hands.problem.holds import without_holds
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.resampling import resampled, resampled_model
 from casadi_hands.problem.si import design_change
+from casadi_hands.problem.strength import Strength
 from casadi_hands.stages.refine.continuation import Continuation
 from casadi_hands.stages.refine.result import Refined
 from casadi_hands.stages.refine.values import Margin
 from casadi_hands.stages.synthesis.algorithm import run_record
-from casadi_hands.verify.report import Audit
 
 Array = NDArray[np.float64]
-# What an exact motion misses only by how it goes between its samples; then it gets more of them.
-BETWEEN = {"residual", "residual_between", "gap_between", "slip", "penetration", "joint_limit"}
-FINEST = 0.02  # s between samples
-ENOUGH = 0.7  # of a limit: intervals that contribute more are halved
-LEFT = 1 / 8  # of what an interval slips, once it is halved; a cubic spline's error falls to a sixteenth
+BORNE = {"bearing_moment", "link_stress", "tip_deflection"}
 HARDLY = 0.3  # of the joints' stiffness: a grasp that asks for more is lost where joints are a little softer
 NEARLY = 0.1  # of the replays: where no more drop the object, a grip in between may do
 GAIN = 0.8  # of how far limits are missed, that more samples must reach to be worth still more
+
+
+Found = tuple[Design, Refined, Continuation]  # judged, what it was made of, and found with
 
 
 class Refiner:
@@ -79,15 +79,18 @@ class Refiner:
         planned, margins = self.record.design, margins_for(self.model, whole)
         margin, largest = margin or margins.ample, margins.larger
         refined, stage = self._exact(whole, margin, near, homotopy, largest)
-        judged, refined, stage = self._between(whole, refined, stage, short, planned)
+        judged, refined, stage = self._borne(
+            whole, self._between(whole, refined, stage, short, planned), short, planned
+        )
         if refined.exact and judged.status != "certified" and not stage.passes_through(refined):
             # Where joints barely push, fingers may fold over in an instant: other forces take them another way.
             margin, which = (margins.ample, "smaller") if refined.margin == largest else (largest, "larger")
-            if "least_stiffness" in judged.missed:  # which asks for less, the less fingers press
+            if judged.missed & {"least_stiffness", "torque"}:  # which ask for less, the less fingers press
                 margin, which = margins.softer, "smaller"
             text = f"again with a {which} lower bound on normal forces: {judged.reason}"
             other = self._with_margin(whole, refined, stage, margin, text)
-            design, other, halved = self._between(whole, other, stage, short, planned)
+            found = self._between(whole, other, stage, short, planned)
+            design, other, halved = self._borne(whole, found, short, planned)
             if design.status == "certified":
                 judged, refined, stage = design, other, halved
         judged = self._replayed(judged)
@@ -106,10 +109,11 @@ class Refiner:
                 break
             text = f"again with a {which} grip: {judged.replay_words}"
             other = self._with_margin(whole, refined, stage, another, text)
-            held = self._judged(stage.model, other, short, planned)
+            found = self._judged(stage.model, other, short, planned), other, stage
+            held, other, _ = self._borne(whole, found, short, planned)
             design = self._replayed(held)
             best = min(best, (design, other), key=lambda each: rank_of(each[0]))
-            if best[0].status == "certified" or (held.status == "certified" and not _nearly(best[0])):
+            if best[0].status == "certified" or (held.status == "certified" and not _in_between(judged, design)):
                 break
             self.record.log("refine", f"not with a {which} grip: {design.reason}")
         return best
@@ -134,7 +138,7 @@ class Refiner:
 
     def _between(
         self, whole: WholeHand, refined: Refined, stage: Continuation, short: tuple[Reason, ...], planned: Design
-    ) -> tuple[Design, Refined, Continuation]:
+    ) -> Found:
         """Judge a refinement; where it is exact but between samples, halve intervals as long as that helps."""
         judged = self._judged(stage.model, refined, short, planned)
         # Fingers that pass through each other do so on any knots.
@@ -151,10 +155,24 @@ class Refiner:
                 halved = Continuation(finer, stage.contacts, stage.joints, hand.active)
                 closer = self._attempt(whole, refined.margin, partial(halved.renew, hand))
             design = self._judged(finer, closer, short, planned)
-            if _excess(design) > GAIN * _excess(judged) and len(design.missed) >= len(judged.missed):
+            if excess(design) > GAIN * excess(judged) and len(design.missed) >= len(judged.missed):
                 break
             judged, refined, stage = design, closer, halved
         return judged, refined, stage
+
+    def _borne(self, whole: WholeHand, found: Found, short: tuple[Reason, ...], planned: Design) -> Found:
+        """An exact motion or, where its forces ask too much of links or bearings, one with others if it is better."""
+        judged, refined, stage = found
+        task, model = self.record.task, stage.model
+        least = min(getattr(task.limits, name) for name in BORNE)
+        if not refined.exact or not judged.missed & BORNE or model.strength or least == 0:
+            return found
+        held = replace(model, strength=Strength.of(task, model.units))
+        strong = Continuation(held, stage.contacts, stage.joints, stage.active)
+        text = f"again with what links and bearings bear as a limit: {judged.reason}"
+        other = self._with_margin(whole, refined, strong, refined.margin, text)
+        borne = self._between(whole, other, strong, short, planned)
+        return min(found, borne, key=lambda each: rank_of(each[0]))
 
     def _with_margin(
         self, whole: WholeHand, refined: Refined, stage: Continuation, margin: Margin, why: str
@@ -231,46 +249,12 @@ class Refiner:
         return design
 
 
-def intervals_to_halve(
-    found: Audit, lengths: Array, of_samples: Callable[[Array], Array] = np.asarray
-) -> NDArray[np.bool_]:
-    """The intervals between samples that must be shorter for a motion to keep its limits between samples, too.
-
-    Args:
-        found: by the audit.
-        lengths: (K,) of the intervals, s.
-        of_samples: what was found in each interval of the files, in each of these.
-    """
-    able = lengths >= 2 * FINEST - 1e-9
-    marked = np.zeros(len(lengths), bool)
-    for name in BETWEEN:
-        figure = found.figures[name]
-        if figure.holds or figure.by_interval is None or figure.limit is None:
-            continue
-        most = ENOUGH * figure.limit
-        by_interval = of_samples(figure.by_interval)
-        if name != "slip":
-            marked |= by_interval > most
-            continue
-        for run in by_interval:
-            gains = (1 - LEFT) * np.where(able, run, 0.0)
-            largest = np.argsort(-gains, kind="stable")
-            # None where the run slips little, all that slip where halving all of them is not enough.
-            needed = np.searchsorted(np.cumsum(gains[largest]), run.sum() - most)
-            chosen = largest[: needed + 1 if run.sum() > most else 0]
-            marked[chosen[gains[chosen] > 0]] = True
-    # What a joint does in an interval depends on the samples around it, too.
-    marked |= np.append(marked[1:], False) | np.append(False, marked[:-1])
-    return marked & able
-
-
 def _nearly(design: Design) -> bool:
     """Whether all that a design misses is that a few replays fewer should drop the object."""
     dropped = design.certificate.get("replay_dropped", {}).get("value") or 0.0
     return design.missed == {"replay_dropped"} and dropped <= NEARLY
 
 
-def _excess(design: Design) -> float:
-    """How far the worst figure between samples is beyond its limit, over the limit; 0 where all are kept."""
-    missed = [design.certificate[name] for name in design.missed & BETWEEN]
-    return max((np.inf if f["value"] is None else f["value"] / max(f["limit"], 1e-12) - 1 for f in missed), default=0.0)
+def _in_between(one: Design, other: Design) -> bool:
+    """Whether a grip between two may do: one of these nearly does, or each keeps the limits that the other misses."""
+    return _nearly(one) or _nearly(other) or not one.missed & other.missed

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
@@ -11,13 +12,14 @@ import numpy as np
 import pytest
 
 from casadi_hands.export.design import Design
-from casadi_hands.pipeline import certify
+from casadi_hands.pipeline import certify, halving
 from casadi_hands.pipeline import refiner as refiner_module
 from casadi_hands.pipeline.certify import Certifier
 from casadi_hands.pipeline.margins import Margins
 from casadi_hands.pipeline.record import Record
-from casadi_hands.pipeline.refiner import Refiner, intervals_to_halve
+from casadi_hands.pipeline.refiner import Refiner
 from casadi_hands.problem.si import build_model
+from casadi_hands.problem.strength import Strength
 from casadi_hands.stages.refine.result import Run, Worst
 from casadi_hands.stages.refine.values import Margin
 from casadi_hands.stages.synthesis.algorithm import Candidate, Found
@@ -235,7 +237,7 @@ def test_what_is_missed_only_between_samples_gets_more_of_them(
         parts = np.zeros(len(tried[-1]) - 1)
         parts[0] = 4.0 / len(tried)
         parts = parts if missed != "slip" else parts[None]
-        kept = {name: Figure(name, 0.0, 1.0, "m", "") for name in refiner_module.BETWEEN}
+        kept = {name: Figure(name, 0.0, 1.0, "m", "") for name in halving.BETWEEN}
         return SimpleNamespace(figures={**kept, missed: Figure(missed, parts.sum(), 1.0, "m", "", by_interval=parts)})
 
     monkeypatch.setattr(refiner_module, "margins_for", lambda *_: Margins(AMPLE, LARGE, FIRMER, LOOSER, SOFT))
@@ -259,11 +261,22 @@ class Ways:
         firm: whether a long way is gone with the firm grip.
     """
 
-    model, contacts, joints = None, (0, 1), (1, 1)
+    contacts, joints, active = (0, 1), (1, 1), None
 
     def __init__(self, firm: bool) -> None:
         self.firm, self.passes = firm, False
         self.asked: list[tuple[str, Margin]] = []
+        self.models: list[Any] = []
+
+    def of(self, model: Any) -> Ways:
+        """The same for a model."""
+        self.models.append(model)
+        return self
+
+    @property
+    def model(self) -> Any:
+        """The last one that it was made for."""
+        return self.models[-1]
 
     def taken(self, name: str, margin: Margin) -> Any:
         self.asked.append((name, margin))
@@ -296,30 +309,38 @@ def refine(
     angle: float = 1.0,
     soft: bool = False,
     torque: float | None = None,
+    angles: Sequence[float] = (),
+    missed: Sequence[str] = (),
 ) -> tuple[Margin, int]:
     """The margin of what is kept and its drops, where designs and drops are judged as told, in this order.
 
     Of each the grasp asks for a stiffness, N·m/rad, and a share of the motors' torque, if they have one, and the replay
-    as planned ends at an angle, degrees, off a goal.
+    as planned ends at an angle, degrees, off a goal: the same of all, or one of each. Designs that are not certified
+    miss the limits of what is told.
     """
     judged, dropped = iter(statuses), iter(drops)
+    turned = iter(angles or [angle] * len(drops))
     monkeypatch.setattr(refiner_module, "margins_for", lambda *_: Margins(AMPLE, LARGE, FIRMER, LOOSER, SOFT))
-    monkeypatch.setattr(refiner_module, "Continuation", lambda *_: ways)
+    monkeypatch.setattr(refiner_module, "Continuation", lambda model, *_: ways.of(model))
     monkeypatch.setattr(Refiner, "_attempt", lambda self, whole, margin, refine: refine(margin=margin))
     measured: dict[str, dict[str, Any]] = {
         "least_stiffness": {"value": stiffness, "limit": 1.0, "holds": stiffness <= 1.0}
     }
     unit = {"value": 0.9, "unit": "N·m"} if torque is None else {"value": torque, "unit": "share"}
     measured["torque"] = {"limit": 1.0, "holds": True, **unit}
-    told = {"replay_angle": {"value": angle, "limit": 5.0, "holds": True}}
 
     def judge(self: Refiner, *_: Any) -> Design:
-        return replace(self.record.design, status=next(judged), certificate=measured)
+        status, over = next(judged), {"value": 2.0, "limit": 1.0, "holds": False}
+        missing = {} if status == "certified" else dict.fromkeys(missed, over)
+        return replace(self.record.design, status=status, certificate=measured | missing)
 
     def played(self: Refiner, design: Design) -> Design:
         if design.status != "certified":
             return design
-        return replayed(replace(design, certificate=measured | told), next(dropped))
+        off = next(turned)
+        told = {"replay_angle": {"value": off, "limit": 5.0, "holds": off <= 5}}
+        seen = replayed(replace(design, certificate=measured | told), next(dropped))
+        return seen if off <= 5 else replace(seen, status="feasible")
 
     monkeypatch.setattr(Refiner, "_judged", judge)
 
@@ -377,6 +398,42 @@ def test_where_hardly_too_many_replays_drop_a_grip_in_between_is_tried(
     tried = [SOFT, LOOSER][: len(drops) - 1]
     assert refine(monkeypatch, ways, 1.0, ["certified"] * len(drops), drops, stiffness=0.4) == (kept, min(drops))
     assert ways.asked == [("solve", AMPLE), *(("with_margin", margin) for margin in tried)]
+
+
+@pytest.mark.parametrize(
+    ("drops", "angles", "due"),
+    [
+        ([4, 0, 1], [1.0, 6.0, 2.0], [LARGE, FIRMER]),
+        ([4, 4], [1.0, 6.0], [LARGE]),
+    ],
+)
+def test_a_grip_in_between_is_tried_where_each_keeps_what_the_other_misses(
+    monkeypatch: pytest.MonkeyPatch, drops: list[int], angles: list[float], due: list[Margin]
+) -> None:
+    ways = Ways(firm=False)
+    kept, left = refine(monkeypatch, ways, 1.0, ["certified"] * len(drops), drops, angles=angles)
+    assert ways.asked == [("solve", AMPLE), *(("with_margin", margin) for margin in due)]
+    assert (kept, left) == ((FIRMER, 1) if FIRMER in due else (AMPLE, 4))
+
+
+@pytest.mark.parametrize("missed", ["bearing_moment", "link_stress", "tip_deflection"])
+@pytest.mark.parametrize("helps", [True, False])
+def test_where_links_bear_too_much_what_they_bear_is_a_limit(
+    monkeypatch: pytest.MonkeyPatch, missed: str, helps: bool
+) -> None:
+    ways = Ways(firm=False)
+    statuses = ["feasible", "certified"] if helps else ["feasible"] * 3
+    refine(monkeypatch, ways, 1.0, statuses, [0] if helps else [], missed=[missed])
+    assert ways.asked == [("solve", AMPLE), ("with_margin", AMPLE), ("with_margin", LARGE)][: len(statuses)]
+    first, *held = ways.models
+    assert first.strength is None
+    assert held[0].strength == Strength.of(ball_task(), first.units)
+
+
+def test_a_softer_grip_is_tried_where_a_plan_takes_more_torque_than_there_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    ways = Ways(firm=False)
+    refine(monkeypatch, ways, 1.0, ["feasible", "certified"], [0], missed=["torque"])
+    assert ways.asked == [("solve", AMPLE), ("with_margin", SOFT)]
 
 
 @pytest.mark.parametrize(("torque", "kept"), [(0.9, SOFT), (0.7, LARGE), (None, LARGE)])
@@ -490,13 +547,13 @@ def test_where_fingers_pass_through_each_other_no_other_grip_is_tried(monkeypatc
 
 
 def test_intervals_that_use_up_a_limit_and_their_neighbours_are_halved() -> None:
-    figures = {name: Figure(name, 0.0, 1.0, "m", "", by_interval=np.zeros(8)) for name in refiner_module.BETWEEN}
+    figures = {name: Figure(name, 0.0, 1.0, "m", "", by_interval=np.zeros(8)) for name in halving.BETWEEN}
     lengths = np.full(8, 0.1)
 
     def marked(name: str, *parts: list[float]) -> list[int]:
         value = max(map(sum, parts)) if name == "slip" else max(parts[0])
         figure = Figure(name, value, 1.0, "m", "", by_interval=np.array(parts if name == "slip" else parts[0]))
-        found = intervals_to_halve(Audit("", {**figures, name: figure}, ()), lengths)
+        found = halving.intervals_to_halve(Audit("", {**figures, name: figure}, ()), lengths)
         return np.flatnonzero(found).tolist()
 
     assert marked("penetration", [0, 0, 1.5, 0, 0, 0, 0.8, 0.6]) == [1, 2, 3, 5, 6, 7]
