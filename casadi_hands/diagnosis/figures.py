@@ -93,7 +93,7 @@ def speed_reason(model: Model, design: Result) -> Reason | None:
 
 # The audit's figures.
 
-GRASP_ADVICE = "more friction, more fingers, or contacts that surround the object better"
+GRASP_ADVICE = "more friction, more fingers, or contacts that surround the object better (fingers: auto finds some)"
 _ADVICE = {
     "structure": "solving the task again",
     "goal_position": "goals within reach, or limits.goal_position as wide as you can accept",
