@@ -32,7 +32,8 @@ from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.placement import in_palm
 from casadi_hands.problem.si import build_model
-from casadi_hands.stages.refine.values import Margin, force_ramp
+from casadi_hands.stages.refine.touching import force_ramp
+from casadi_hands.stages.refine.values import Margin
 from casadi_hands.task import Task
 
 Array = NDArray[np.float64]

@@ -24,11 +24,13 @@ class Regrasp:
         lifted: (N, C) bool, from its keyframe to the next; the ground's contact, if any, last.
         patches: (N, C, 3) where contacts are wanted at the keyframes, object frame.
         asked: whether the task says who lifts, when and where to.
+        still: (N,) bool, from which keyframes to the next the object rests, as too few others hold it; None: never.
     """
 
     lifted: NDArray[np.bool_]
     patches: Array
     asked: bool = False
+    still: NDArray[np.bool_] | None = None
 
 
 def regrasp_times(task: Task) -> list[float]:

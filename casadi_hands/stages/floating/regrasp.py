@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import pairwise
+
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 from casadi_hands.problem.model import Model, palm_from_world
 from casadi_hands.problem.regrasp import Regrasp
+from casadi_hands.stages.object_motion.values import straight_path
 
 Array = NDArray[np.float64]
 # That a contact travels around the object, seen from the palm: beyond it fingers reach around.
 FARTHEST = np.radians(100)
+PINCHED = 3  # contacts: fewer pinch an object, which turns between them as it likes
 MOST_TRAVEL = np.radians(60)  # likewise, of contacts that cannot be regrasped: near enough for fingers to roll on
 
 
@@ -38,7 +43,31 @@ def planned_regrasp(model: Model, pose: Array) -> Regrasp | None:
             if angle_between(turns[k] @ patches[k, c], taken) > FARTHEST and k < len(keyframes) - 1:
                 lifted[k - 1, c] = True
                 patches[k:, c] = model.touched[c].on_surface(turns[k].T @ taken)
-    return Regrasp(lifted, patches) if lifted.any() else None
+    if not lifted.any():
+        return None
+    still = resting_intervals(model, lifted)
+    plan = Regrasp(lifted, patches, still=still)
+    if still.any():  # it is elsewhere then when it is touched again
+        turns = turns_seen(model, straight_path(replace(model, regrasp=plan)))
+        first = turns[0] @ patches[0].T
+        for k, c in np.argwhere(lifted):
+            patches[k + 1 :, c] = model.touched[c].on_surface(turns[k + 1].T @ first[:, c])
+    return plan
+
+
+def resting_intervals(model: Model, lifted: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """From which keyframes (N,) to the next the object rests: where a finger is off it and fewer than three hold it.
+
+    Two hold an object by their fingertips' torsion alone, which is no way to swing it about. It does not rest where it
+    has to move all the way from one goal to the next, where a joint holds it, or where the palm carries it.
+    """
+    still: NDArray[np.bool_] = lifted.any(axis=1) & ((~lifted).sum(axis=1) < PINCHED)
+    if model.attachment is not None or model.tool is not None or np.ptp(model.palm_position, axis=0).any():
+        return np.zeros_like(still)
+    for begin, end in pairwise(model.schedule.goals):
+        if still[begin:end].all():
+            still[begin:end] = False
+    return still
 
 
 def limited_travel(model: Model, pose: Array) -> Regrasp:

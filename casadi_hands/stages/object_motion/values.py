@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ Array = NDArray[np.float64]
 GOAL_TOLERANCE = 5e-4  # lengths and rad, each coordinate: the task's cost alone gives way to slow accelerations
 REGRASP_ROOM = 0.15  # lengths about its patches, for a contact that is regrasped
 LANDING_ROOM = 0.11  # lengths, each coordinate, about where the task has a finger touch again: the audit allows 0.2
+PLANNED_ROOM = 0.15  # likewise about where the program has planned it: elsewhere it may have no lever to go on with
 MOST_TURN = 5.6  # rad, up to where the exponential map's coordinates are used where goals do not turn farther
 
 
@@ -42,14 +44,28 @@ def _between_goals(model: Model, times: Array) -> Array:
 def straight_path(model: Model) -> Array:
     """Poses (N, 6) at the keyframes on the straight way between goals, as a palm that moves sees it.
 
-    A drawing's object stays upright, and its tool on the straight way in the world.
+    A drawing's object stays upright, and its tool on the straight way in the world. Where it is planned to rest
+    between two keyframes it does, and is the faster between others.
     """
-    between, schedule = _between_goals(model, model.schedule.keyframes), model.schedule
+    between, schedule = _between_goals(model, _time_moved(model)), model.schedule
     if model.attachment is not None:
         return model.attachment.poses(between @ model.attachment.goals)
     if model.tool is not None:
         return between @ np.hstack([model.goal_positions - model.tool, model.goal_vectors])
     return carried_by_palm(model, between @ goals_seen_from_palm(model), schedule.keyframe_samples)
+
+
+def _time_moved(model: Model) -> Array:
+    """Times (N,) at which the object would be where it is at the keyframes, did it never rest on its way."""
+    keyframes = model.schedule.keyframes
+    if model.regrasp is None or model.regrasp.still is None:
+        return keyframes
+    times = keyframes.copy()
+    moved = np.append(0.0, np.cumsum(np.diff(keyframes) * ~model.regrasp.still[:-1]))
+    for begin, end in pairwise(model.schedule.goals):
+        share = (moved[begin : end + 1] - moved[begin]) / (moved[end] - moved[begin])
+        times[begin : end + 1] = keyframes[begin] + share * (keyframes[end] - keyframes[begin])
+    return times
 
 
 def carried_acceleration(model: Model) -> Array:
@@ -92,15 +108,16 @@ def point_bounds(model: Model) -> tuple[Array, Array]:
 
 
 def landing_bounds(model: Model, contacts: Sequence[int]) -> tuple[Array, Array]:
-    """Bounds (S, 3C) of some contacts' points at the samples: near where fingers are asked to touch again."""
+    """Bounds (S, 3C) of some contacts' points at the samples: near where fingers shall touch again."""
     samples, chosen = len(model.schedule.samples), list(contacts)
     high = np.full((samples, len(chosen), 3), np.inf)
     low = -high
-    if model.regrasp is not None and model.regrasp.asked:
+    if model.regrasp is not None:
+        room = LANDING_ROOM if model.regrasp.asked else PLANNED_ROOM
         lifted, patches = model.regrasp.lifted[:, chosen], model.regrasp.patches[:, chosen]
         k, c = np.nonzero(lifted[:-1] & ~lifted[1:])
         at = model.schedule.keyframe_samples[k + 1]
-        low[at, c], high[at, c] = patches[k + 1, c] - LANDING_ROOM, patches[k + 1, c] + LANDING_ROOM
+        low[at, c], high[at, c] = patches[k + 1, c] - room, patches[k + 1, c] + room
     return low.reshape(samples, -1), high.reshape(samples, -1)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from casadi_hands.kinematics.singularity import MARGIN_SIZES
 from casadi_hands.nlp import Parameter, Rows
@@ -10,6 +11,9 @@ from casadi_hands.problem.model import Model
 from casadi_hands.stages.buildable import buildable, buildable_bounds
 from casadi_hands.stages.refine import finger_kernels as kernels
 from casadi_hands.stages.refine.declaration import FREE, IN_CONE, Bounds, Declaration, Knots
+
+Array = NDArray[np.float64]
+LIFTED, RISING = 0.06, 0.2  # lengths that a finger which has let go stays off the object, and lengths/s until it does
 
 
 def bind_contact(of: Declaration, i: int) -> None:
@@ -128,12 +132,22 @@ def bind_clearance(of: Declaration, i: int) -> None:
     touching, idle = structure.touching[:, i], np.flatnonzero(~structure.active[:-1, i])
 
     def bind(
-        kind: str, knots: Knots, moving: dict[str, Rows], palm: dict[str, Parameter], least: float, skipped: int | None
+        kind: str,
+        knots: Knots,
+        moving: dict[str, Rows],
+        palm: dict[str, Parameter],
+        least: float,
+        skipped: int | None,
+        lifted: Array | None = None,
     ) -> None:
+        kernel = kernels.apart(n, model.kinds, skipped, model.ground is not None, bool(model.servo))
+        lower = np.full((len(knots), kernel.constraints["clear"].numel()), least)
+        if lifted is not None:  # last of all are the last link's distances from the object's bodies
+            lower[:, -len(model.kinds) :] += lifted[:, None]
         of.bind(
             knots,
-            kernels.apart(n, model.kinds, skipped, model.ground is not None, bool(model.servo)),
-            {"clear": (least, np.inf), "unfolded": (0.0, np.inf)},
+            kernel,
+            {"clear": (lower, np.inf), "unfolded": (0.0, np.inf)},
             (c,),
             f"{kind}{c}",
             **_shape(of, i, knots),
@@ -143,15 +157,30 @@ def bind_clearance(of: Declaration, i: int) -> None:
             **of.of(c, knots, "frames"),
         )
 
+    away = lift(touching, model.schedule.samples)
     for kind, where, skipped in (("apart_touching", touching, touched), ("apart", ~touching, None)):
         knots = np.flatnonzero(where)
         if len(knots):
             moving = {"pose": of.pose.take(knots), "angles": of.angles[i].take(knots)}
-            bind(kind, knots, moving, of.at(knots, "palm_position", "palm_quaternion"), model.clearance, skipped)
+            palm, lifted = (
+                of.at(knots, "palm_position", "palm_quaternion"),
+                None if skipped is not None else away[knots],
+            )
+            bind(kind, knots, moving, palm, model.clearance, skipped, lifted)
     if len(idle):  # a lifted finger is quick, and must not cut through the object's edge between two knots
         halves = structure.middles.weights(idle)
         moving = {"pose": of.pose.combine(halves), "angles": of.angles[i].combine(halves)}
         bind("apart_between", idle, moving, of.between(idle), 0.0, None)
+
+
+def lift(touching: NDArray[np.bool_], times: Array) -> Array:
+    """How much farther (S,) from the object than others a finger stays that touches it at some times (S,), lengths.
+
+    An object held by the others alone gives way a little, and must not be met by the finger that goes around it.
+    """
+    if not touching.any():
+        return np.full(len(times), LIFTED)
+    return np.asarray(np.minimum(RISING * np.abs(times[:, None] - times[touching]).min(axis=1), LIFTED))
 
 
 def bind_shape(of: Declaration, i: int) -> None:

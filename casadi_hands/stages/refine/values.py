@@ -24,12 +24,14 @@ from casadi_hands.stages.refine.problem import RefineProblem
 from casadi_hands.stages.refine.settings import SHARP, SPIN_SCALE
 from casadi_hands.stages.refine.sliding import SLIP_SCALE, WHOLE, runs
 from casadi_hands.stages.refine.sliding import start as sliding_start
+from casadi_hands.stages.refine.touching import force_ramp, longest_run, resting
 
 Array = NDArray[np.float64]
-RAMP = 0.5  # s over which a contact that touches or lifts comes to press with its full force, or to let go
 TOOL_TOLERANCE = 5e-3  # lengths, how far a drawing's tool may leave its path between goals
 LIFTING_TIE = 2.0  # of a contact to where it was planned, where it lets go in order to touch elsewhere
 SLIDING_TIE = 0.3  # of a contact to where it was planned to slide; it shall roll if it can
+RESTING = np.repeat([0.03, 0.03], 3)  # lengths/s and rad/s at most, of an object that is planned to rest
+PINCHED = 2.5  # times the lower bound on normal forces then, as torsion alone holds the object
 ROUGHLY = 10.0  # times of what no joint may supply at knots may be so between them, where motions are interpolated
 Bounds = dict[str, tuple[ArrayLike, ArrayLike]]
 
@@ -63,6 +65,7 @@ class RefineValues:
         # A contact that touches again bears nothing until it does: its force grows from zero.
         self._active = active = self.structure.active
         self.bearing = active & np.vstack([active[:1], active[:-1]])
+        self.resting = resting(model)
 
     def constraint_bounds(self, margin: Margin) -> tuple[Bounds, Bounds]:
         """Bounds of constraints: those that hold in every solve, and those of the exact one.
@@ -74,7 +77,8 @@ class RefineValues:
         always: Bounds = {}
         exact: Bounds = {}
         for i, c in enumerate(structure.contacts):
-            floor = margin.normal_force * force_ramp(self.bearing[:, i], times)[structure.touching[:, i]]
+            floor = margin.normal_force * force_ramp(self.bearing[:, i], times) * np.where(self.resting, PINCHED, 1.0)
+            floor = floor[structure.touching[:, i]]
             always[f"contact{c}.pressing"] = (floor[:, None], np.inf)
             # The point stays on the object's surface, where its force acts; the link may be a little off it.
             exact[f"contact{c}.on_link"] = (-model.gap_tolerance, model.gap_tolerance)
@@ -130,6 +134,7 @@ class RefineValues:
             at, tolerance = schedule.goal_samples, np.repeat(model.goal_tolerance, 3)
             low_pose[at], high_pose[at] = goals - tolerance, goals + tolerance
         rate = np.full((count, 6), np.inf)
+        rate[self.resting] = RESTING
         rate[[0, *schedule.hold_samples, -1]] = 0.0
         most = model.force_limit
         bearing, active = (np.repeat(np.where(f, most, 0.0), 3, axis=1) for f in (self.bearing, self._active))
@@ -268,21 +273,6 @@ class RefineValues:
             values[f"tie{c}"] = SLIDING_TIE if model.slides(c) else LIFTING_TIE if model.lifts(c) else 1.0
             values[f"helper{c}"] = _helpers(motion.point[:, c], model.touched[c])
         return values
-
-
-def force_ramp(bearing: NDArray[np.bool_], times: Array) -> Array:
-    """Share (S,) of the normal force asked of a contact at times (S,): it grows after a touch, falls before a lift."""
-    if bearing.all():
-        return np.ones(len(bearing))
-    away = np.abs(times[:, None] - times[~bearing]).min(axis=1)
-    return np.asarray(np.minimum(away / RAMP, 1.0))
-
-
-def longest_run(flags: NDArray[np.bool_], lengths: Array) -> float:
-    """Longest stretch of intervals (K,) with set flags, in all of their lengths; 0 where none is set."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
-    passed = np.append(0.0, np.cumsum(lengths))
-    return float((passed[edges[1::2]] - passed[edges[::2]]).max(initial=0.0))
 
 
 def _helpers(points: Array, body: Body) -> Array:

@@ -16,7 +16,7 @@ from casadi_hands.problem.resampling import shortened
 from casadi_hands.problem.si import build_model
 from casadi_hands.stages.floating import stage as floating_stage
 from casadi_hands.stages.floating.gate import passes_gate
-from casadi_hands.stages.floating.regrasp import FARTHEST, limited_travel, planned_regrasp
+from casadi_hands.stages.floating.regrasp import FARTHEST, limited_travel, planned_regrasp, resting_intervals
 from casadi_hands.stages.floating.stage import (
     BARRIERS,
     LIMITED,
@@ -28,11 +28,13 @@ from casadi_hands.stages.floating.stage import (
 )
 from casadi_hands.stages.object_motion.values import (
     LANDING_ROOM,
+    PLANNED_ROOM,
     REGRASP_ROOM,
     landing_bounds,
     point_bounds,
     straight_path,
 )
+from casadi_hands.stages.refine.touching import resting
 from casadi_hands.task import parse_task
 from casadi_hands.verify.checks.motion import NEAR
 from tests.stages.example import made_up_solution, rod
@@ -72,7 +74,9 @@ def test_only_the_contact_off_the_axis_lets_go_and_takes_the_object_where_it_fir
     # 42.5 degrees a keyframe: 127.5 are too many, so it lifts at the second and touches at the third.
     np.testing.assert_array_equal(np.argwhere(plan.lifted), [[2, 2]])
     np.testing.assert_allclose(plan.patches[:3], np.tile(model.patches, (3, 1, 1)))
-    turned = Rotation.from_rotvec(pose[3, 3:])
+    # Two hold it meanwhile, so it rests.
+    turned = Rotation.from_rotvec(straight_path(replace(model, regrasp=plan))[3, 3:])
+    assert turned.magnitude() == pytest.approx(np.radians(170) * 2 / 3)
     direction = turned.apply(plan.patches[3, 2])
     first = model.patches[2]
     # The object's axis has another direction then: on its surface, as near as that lets it be.
@@ -83,6 +87,41 @@ def test_only_the_contact_off_the_axis_lets_go_and_takes_the_object_where_it_fir
     axis = capsule[:3] + along * (capsule[3:6] - capsule[:3])
     distance = np.linalg.norm(plan.patches[3, 2] - axis, axis=1).min()
     assert distance == pytest.approx(capsule[6], abs=1e-6)
+
+
+def test_the_object_rests_while_two_hold_it_and_makes_up_for_it() -> None:
+    model = turning(170)
+    plan = planned_regrasp(model, straight_path(model))
+    assert plan is not None
+    planned = replace(model, regrasp=plan)
+    degrees = np.degrees(straight_path(planned)[:, 4])
+    np.testing.assert_allclose(degrees, [0, 170 / 3, 340 / 3, 340 / 3, 170], atol=1e-9)
+    times = model.schedule.samples
+    np.testing.assert_array_equal(resting(planned), (times > 2 - 1e-9) & (times < 3 + 1e-9))
+    assert not resting(model).any()
+    assert not resting(replace(model, regrasp=replace(plan, still=None))).any()
+
+
+@pytest.mark.parametrize(
+    ("lifted", "fingers", "rests"),
+    [
+        ([(1, 2)], 3, [1]),
+        ([(1, 2), (2, 1)], 3, [1, 2]),
+        ([(0, 2), (1, 2), (2, 2), (3, 2)], 3, []),  # all the way from one goal to the next
+        ([(1, 2)], 4, []),
+        ([(1, 2), (1, 3)], 4, [1]),
+    ],
+)
+def test_it_rests_where_fewer_than_three_hold_it_and_it_has_time_to_move(
+    lifted: list[tuple[int, int]], fingers: int, rests: list[int]
+) -> None:
+    flags = np.zeros((5, fingers), bool)
+    for k, c in lifted:
+        flags[k, c] = True
+    model = turning(170)
+    assert np.flatnonzero(resting_intervals(model, flags)).tolist() == rests
+    carried = replace(model, palm_position=model.palm_position + np.linspace(0, 1, len(model.palm_position))[:, None])
+    assert not resting_intervals(carried, flags).any()
 
 
 def ball() -> Model:
@@ -264,6 +303,9 @@ def test_points_are_bounded_where_fingers_are_asked_to_touch_again() -> None:
     np.testing.assert_allclose(high[landing, 0], point + LANDING_ROOM)
     np.testing.assert_allclose(low[landing, 0], point - LANDING_ROOM)
     assert np.sqrt(3) * LANDING_ROOM < NEAR
+    assert model.regrasp is not None
+    planned = replace(model, regrasp=replace(model.regrasp, asked=False))
+    np.testing.assert_allclose(landing_bounds(planned, (0,))[1][landing], point + PLANNED_ROOM)
     assert not np.isfinite(landing_bounds(replace(model, regrasp=None), (0, 2))).any()
     keyframes = point_bounds(model)[1].reshape(-1, 4, 3)
     assert np.isfinite(keyframes[:, :2]).all()

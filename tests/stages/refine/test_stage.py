@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,11 +19,13 @@ from casadi_hands.problem.commands import coupled
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.outcome import whole_hand_motion
+from casadi_hands.problem.regrasp import Regrasp
 from casadi_hands.problem.si import build_model, design_change, hand_of, joint_loads
 from casadi_hands.stages.floating.stage import FloatingStage
 from casadi_hands.stages.refine import continuation
 from casadi_hands.stages.refine import stage as refine
 from casadi_hands.stages.refine.continuation import Continuation
+from casadi_hands.stages.refine.finger_binding import lift
 from casadi_hands.stages.refine.result import Refined, Worst
 from casadi_hands.stages.refine.settings import (
     ACCEPTED,
@@ -36,7 +37,8 @@ from casadi_hands.stages.refine.settings import (
     WEIGHTS,
 )
 from casadi_hands.stages.refine.stage import RefineStage
-from casadi_hands.stages.refine.values import TOOL_TOLERANCE, Margin, RefineValues, longest_run
+from casadi_hands.stages.refine.touching import longest_run
+from casadi_hands.stages.refine.values import TOOL_TOLERANCE, Margin, RefineValues
 from casadi_hands.task import Task, load_task
 from casadi_hands.terms import constraints as limits
 from casadi_hands.verify import Audit, audit_files, replay
@@ -132,11 +134,38 @@ def test_contacts_that_touch_anew_are_tied_to_their_plan_more_than_others_and_sl
     lifted[1, 2] = True
     patches = np.zeros((count, model.contacts, 3))
     patches[-1] = 0.1
-    plan: Any = SimpleNamespace(lifted=lifted, patches=patches)
+    plan = Regrasp(lifted, patches)
     planned = RefineValues(made_up.stage.built, replace(model, regrasp=plan)).parameters(made_up.start, Margin())
     assert (planned["tie0"], planned["tie2"]) == (0.3, 2.0)
     plain = RefineValues(made_up.stage.built, replace(model, regrasp=None)).parameters(made_up.start, Margin())
     assert (plain["tie0"], plain["tie2"]) == (1.0, 1.0)
+
+
+def test_an_object_that_rests_is_slow_and_pressed_more_firmly_then(made_up: MadeUp) -> None:
+    model = made_up.model
+    count = len(model.schedule.keyframes)
+    lifted, still = np.zeros((count, len(model.patches)), bool), np.zeros(count, bool)
+    lifted[1, 2] = still[1] = True
+    plan = Regrasp(lifted, model.keyframe_patches, still=still)
+    planned = RefineValues(made_up.stage.built, replace(model, regrasp=plan))
+    plain = RefineValues(made_up.stage.built, replace(model, regrasp=None))
+    at = model.schedule.keyframe_samples
+    rests = np.zeros(len(model.schedule.samples), bool)
+    rests[at[1] : at[2] + 1] = True
+    (low, high), (_, free) = planned.bounds(), plain.bounds()
+    np.testing.assert_allclose(high["rate"], np.where(rests[:, None], np.minimum(free["rate"], 0.03), free["rate"]))
+    np.testing.assert_allclose(low["rate"], -high["rate"])
+    name = "contact0.pressing"
+    floors = [np.asarray(each.constraint_bounds(Margin(normal_force=0.8))[0][name][0]) for each in (planned, plain)]
+    touching = planned.structure.touching[:, 0]
+    np.testing.assert_allclose(floors[0][:, 0], floors[1][:, 0] * np.where(rests, 2.5, 1.0)[touching])
+
+
+def test_a_finger_that_has_let_go_keeps_farther_off_the_object_the_longer() -> None:
+    times = np.array([0.0, 0.1, 0.3, 0.6, 0.7, 1.5])
+    touching = np.array([True, True, False, False, True, False])
+    np.testing.assert_allclose(lift(touching, times), [0.0, 0.0, 0.04, 0.02, 0.0, 0.06])
+    np.testing.assert_allclose(lift(np.zeros(6, bool), times), 0.06)
 
 
 def test_the_longest_run_is_that_of_a_sum() -> None:

@@ -1,0 +1,35 @@
+"""When contacts touch: how firmly they press then, for how long, and when the object rests meanwhile."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from casadi_hands.problem.model import Model
+
+Array = NDArray[np.float64]
+RAMP = 0.5  # s over which a contact that touches or lifts comes to press with its full force, or to let go
+
+
+def resting(model: Model) -> NDArray[np.bool_]:
+    """At which samples (S,) the object is planned to rest, held by two, while another finger goes around it."""
+    flags, at = np.zeros(len(model.schedule.samples), bool), model.schedule.keyframe_samples
+    still = None if model.regrasp is None else model.regrasp.still
+    for k in [] if still is None else np.flatnonzero(still):
+        flags[at[k] : at[k + 1] + 1] = True
+    return flags
+
+
+def force_ramp(bearing: NDArray[np.bool_], times: Array) -> Array:
+    """Share (S,) of the normal force asked of a contact at times (S,): it grows after a touch, falls before a lift."""
+    if bearing.all():
+        return np.ones(len(bearing))
+    away = np.abs(times[:, None] - times[~bearing]).min(axis=1)
+    return np.asarray(np.minimum(away / RAMP, 1.0))
+
+
+def longest_run(flags: NDArray[np.bool_], lengths: Array) -> float:
+    """Longest stretch of intervals (K,) with set flags, in all of their lengths; 0 where none is set."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
+    passed = np.append(0.0, np.cumsum(lengths))
+    return float((passed[edges[1::2]] - passed[edges[::2]]).max(initial=0.0))
