@@ -62,7 +62,8 @@ def resting_intervals(model: Model, lifted: NDArray[np.bool_]) -> NDArray[np.boo
     has to move all the way from one goal to the next, where a joint holds it, or where the palm carries it.
     """
     still: NDArray[np.bool_] = lifted.any(axis=1) & ((~lifted).sum(axis=1) < PINCHED)
-    if model.attachment is not None or model.tool is not None or np.ptp(model.palm_position, axis=0).any():
+    carried = np.ptp(np.hstack([model.palm_position, model.palm_quaternion]), axis=0).any()
+    if model.attachment is not None or model.tool is not None or carried:
         return np.zeros_like(still)
     for begin, end in pairwise(model.schedule.goals):
         if still[begin:end].all():

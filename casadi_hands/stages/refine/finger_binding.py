@@ -162,10 +162,7 @@ def bind_clearance(of: Declaration, i: int) -> None:
         knots = np.flatnonzero(where)
         if len(knots):
             moving = {"pose": of.pose.take(knots), "angles": of.angles[i].take(knots)}
-            palm, lifted = (
-                of.at(knots, "palm_position", "palm_quaternion"),
-                None if skipped is not None else away[knots],
-            )
+            palm, lifted = of.at(knots, "palm_position", "palm_quaternion"), away[knots] if skipped is None else None
             bind(kind, knots, moving, palm, model.clearance, skipped, lifted)
     if len(idle):  # a lifted finger is quick, and must not cut through the object's edge between two knots
         halves = structure.middles.weights(idle)
