@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -76,7 +77,10 @@ class Session:
             )
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            replace_file(self.path.resolve(), lambda path: path.write_text(self.text, encoding="utf-8", newline="\n"))
+            replace_file(
+                Path(os.path.realpath(self.path)),
+                lambda path: path.write_text(self.text, encoding="utf-8", newline="\n"),
+            )
         except OSError as error:
             raise TaskError(f"{self.path}: cannot be written: {error.strerror}; give a path that can") from None
         self._saved = self.text
