@@ -93,13 +93,7 @@ class Refiner:
             design, other, halved = self._borne(whole, found, short, planned)
             if design.status == "certified":
                 judged, refined, stage = design, other, halved
-        judged = self._replayed(judged)
-        if refined.exact and self.model.torsion and judged.replay_angle > AIM:
-            with self.record.stage("refine", f"again, slow spins resisted in full: {judged.replay_words}"):
-                sharp = self._attempt(whole, refined.margin, partial(stage.sharpened, refined))
-            design = self._replayed(self._judged(stage.model, sharp, short, planned))
-            if rank_of(design) < rank_of(judged):
-                judged, refined = design, sharp
+        judged, refined = self._played(whole, (judged, refined, stage), short, planned)
         grips = [(largest, "firmer"), (margins.firmer, "little firmer")]
         if judged.least_stiffness > HARDLY * self.record.task.actuator.stiffness or judged.share_of_torque > STRAINED:
             grips = [(margins.softer, "softer"), (margins.looser, "little softer")]
@@ -110,8 +104,8 @@ class Refiner:
             text = f"again with a {which} grip: {judged.replay_words}"
             other = self._with_margin(whole, refined, stage, another, text)
             found = self._judged(stage.model, other, short, planned), other, stage
-            held, other, _ = self._borne(whole, found, short, planned)
-            design = self._replayed(held)
+            held, other, strong = self._borne(whole, found, short, planned)
+            design, other = self._played(whole, (held, other, strong), short, planned)
             best = min(best, (design, other), key=lambda each: rank_of(each[0]))
             if best[0].status == "certified" or (held.status == "certified" and not _in_between(judged, design)):
                 break
@@ -173,6 +167,19 @@ class Refiner:
         other = self._with_margin(whole, refined, strong, refined.margin, text)
         borne = self._between(whole, other, strong, short, planned)
         return min(found, borne, key=lambda each: rank_of(each[0]))
+
+    def _played(
+        self, whole: WholeHand, found: Found, short: tuple[Reason, ...], planned: Design
+    ) -> tuple[Design, Refined]:
+        """A motion replayed; where it turns off its goals, or one whose slow spins are resisted in full if better."""
+        judged, refined, stage = found
+        judged = self._replayed(judged)
+        if not refined.exact or not self.model.torsion or judged.replay_angle <= AIM:
+            return judged, refined
+        with self.record.stage("refine", f"again, slow spins resisted in full: {judged.replay_words}"):
+            sharp = self._attempt(whole, refined.margin, partial(stage.sharpened, refined))
+        design = self._replayed(self._judged(stage.model, sharp, short, planned))
+        return (design, sharp) if rank_of(design) < rank_of(judged) else (judged, refined)
 
     def _with_margin(
         self, whole: WholeHand, refined: Refined, stage: Continuation, margin: Margin, why: str

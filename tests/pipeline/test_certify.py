@@ -492,10 +492,23 @@ def test_another_grip_is_tried_where_the_replay_as_planned_ends_off_its_goals(mo
     ways = Ways(firm=False)
     refine(monkeypatch, ways, 1.0, ["certified"] * 2, [0, 0], angle=4.0)
     assert ways.asked == [("solve", AMPLE), ("with_margin", LARGE)]
-    # Soft fingertips first resist slow spins in full.
+    # Soft fingertips first resist slow spins in full, with any grip.
     ways = Ways(firm=False)
-    refine(monkeypatch, ways, 1.0, ["certified"] * 3, [0, 0, 0], angle=4.0, soft=True)
-    assert ways.asked == [("solve", AMPLE), ("sharpened", AMPLE), ("with_margin", LARGE)]
+    refine(monkeypatch, ways, 1.0, ["certified"] * 4, [0] * 4, angle=4.0, soft=True)
+    assert ways.asked == [("solve", AMPLE), ("sharpened", AMPLE), ("with_margin", LARGE), ("sharpened", LARGE)]
+
+
+@pytest.mark.parametrize(("angle", "kept"), [(2.0, (LARGE, 1)), (8.0, (LARGE, 1)), (10.0, (LARGE, 1))])
+def test_where_a_firmer_grip_turns_the_object_it_is_taken_with_slow_spins_resisted(
+    monkeypatch: pytest.MonkeyPatch, angle: float, kept: tuple[Margin, int]
+) -> None:
+    ways = Ways(firm=False)
+    angles, drops = [2.0, 9.0, angle], [4, 1, 1]
+    if angle > 5:  # one in between is tried, as each keeps what the other misses
+        angles, drops = [*angles, 6.0, 6.0], [*drops, 4, 4]
+    assert refine(monkeypatch, ways, 1.0, ["certified"] * len(drops), drops, angles=angles, soft=True) == kept
+    tried = [("with_margin", LARGE), ("sharpened", LARGE), ("with_margin", FIRMER), ("sharpened", FIRMER)]
+    assert ways.asked == [("solve", AMPLE), *tried[: len(drops) - 1]]
 
 
 def test_a_long_way_is_gone_with_a_firm_grip_at_once_where_it_can_be(monkeypatch: pytest.MonkeyPatch) -> None:
