@@ -31,12 +31,10 @@ from casadi_hands.stages.synthesis.algorithm import run_record
 
 Array = NDArray[np.float64]
 BORNE = {"bearing_moment", "link_stress", "tip_deflection"}
+Tried = tuple[Design, Refined, Continuation]  # judged, what it was made of, and found with
 HARDLY = 0.3  # of the joints' stiffness: a grasp that asks for more is lost where joints are a little softer
 NEARLY = 0.1  # of the replays: where no more drop the object, a grip in between may do
 GAIN = 0.8  # of how far limits are missed, that more samples must reach to be worth still more
-
-
-Found = tuple[Design, Refined, Continuation]  # judged, what it was made of, and found with
 
 
 class Refiner:
@@ -62,8 +60,9 @@ class Refiner:
     ) -> tuple[Design, Refined]:
         """Refine one hand with a margin, and with others where that fails.
 
-        A small one where no motion is exact, and another lower bound on normal forces where the audit refuses one that
-        is: a smaller one where joints are not stiff enough. Where replays drop the object or end off its goals, a
+        A small one where no motion is exact. Where the audit refuses one that is: within what links and bearings bear,
+        if it is for these, then with another lower bound on normal forces, a smaller one where joints are not stiff,
+        motors not strong, or links not thick enough. Where replays drop the object or end off its goals, a
         firmer grip or, where the joints are hardly stiff enough or motors hardly strong enough, a softer one.
 
         Args:
@@ -85,7 +84,7 @@ class Refiner:
         if refined.exact and judged.status != "certified" and not stage.passes_through(refined):
             # Where joints barely push, fingers may fold over in an instant: other forces take them another way.
             margin, which = (margins.ample, "smaller") if refined.margin == largest else (largest, "larger")
-            if judged.missed & {"least_stiffness", "torque"}:  # which ask for less, the less fingers press
+            if judged.missed & {"least_stiffness", "torque", *BORNE}:  # which ask for less, the less fingers press
                 margin, which = margins.softer, "smaller"
             text = f"again with a {which} lower bound on normal forces: {judged.reason}"
             other = self._with_margin(whole, refined, stage, margin, text)
@@ -132,7 +131,7 @@ class Refiner:
 
     def _between(
         self, whole: WholeHand, refined: Refined, stage: Continuation, short: tuple[Reason, ...], planned: Design
-    ) -> Found:
+    ) -> Tried:
         """Judge a refinement; where it is exact but between samples, halve intervals as long as that helps."""
         judged = self._judged(stage.model, refined, short, planned)
         # Fingers that pass through each other do so on any knots.
@@ -154,7 +153,7 @@ class Refiner:
             judged, refined, stage = design, closer, halved
         return judged, refined, stage
 
-    def _borne(self, whole: WholeHand, found: Found, short: tuple[Reason, ...], planned: Design) -> Found:
+    def _borne(self, whole: WholeHand, found: Tried, short: tuple[Reason, ...], planned: Design) -> Tried:
         """An exact motion or, where its forces ask too much of links or bearings, one with others if it is better."""
         judged, refined, stage = found
         task, model = self.record.task, stage.model
@@ -165,11 +164,13 @@ class Refiner:
         strong = Continuation(held, stage.contacts, stage.joints, stage.active)
         text = f"again with what links and bearings bear as a limit: {judged.reason}"
         other = self._with_margin(whole, refined, strong, refined.margin, text)
+        if not other.exact:
+            return found
         borne = self._between(whole, other, strong, short, planned)
         return min(found, borne, key=lambda each: rank_of(each[0]))
 
     def _played(
-        self, whole: WholeHand, found: Found, short: tuple[Reason, ...], planned: Design
+        self, whole: WholeHand, found: Tried, short: tuple[Reason, ...], planned: Design
     ) -> tuple[Design, Refined]:
         """A motion replayed; where it turns off its goals, or one whose slow spins are resisted in full if better."""
         judged, refined, stage = found

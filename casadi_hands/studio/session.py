@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -77,6 +78,8 @@ class Session:
             )
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
+            if self.path.exists() and not os.access(self.path, os.W_OK):
+                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
             replace_file(
                 Path(os.path.realpath(self.path)),
                 lambda path: path.write_text(self.text, encoding="utf-8", newline="\n"),

@@ -16,11 +16,11 @@ from casadi_hands.stages.object_motion.values import straight_path
 Array = NDArray[np.float64]
 # That a contact travels around the object, seen from the palm: beyond it fingers reach around.
 FARTHEST = np.radians(100)
-PINCHED = 3  # contacts: fewer pinch an object, which turns between them as it likes
+LEAST_HOLDING = 3  # contacts: between fewer an object turns as it likes
 MOST_TRAVEL = np.radians(60)  # likewise, of contacts that cannot be regrasped: near enough for fingers to roll on
 
 
-def planned_regrasp(model: Model, pose: Array) -> Regrasp | None:
+def planned_regrasp(model: Model, pose: Array, active: NDArray[np.bool_] | None = None) -> Regrasp | None:
     """Contacts that let go before they have travelled too far, and take the object again where they first took it.
 
     A contact's travel is the angle at the object's centre, in the palm frame, between where it touched and where the
@@ -29,6 +29,7 @@ def planned_regrasp(model: Model, pose: Array) -> Regrasp | None:
     Args:
         model: the task.
         pose: (N, 6) of the object at the keyframes.
+        active: (N, C) which contacts act from a keyframe to the next; by default all.
 
     Returns:
         The plan, or None where every contact can stay.
@@ -45,23 +46,40 @@ def planned_regrasp(model: Model, pose: Array) -> Regrasp | None:
                 patches[k:, c] = model.touched[c].on_surface(turns[k].T @ taken)
     if not lifted.any():
         return None
-    still = resting_intervals(model, lifted)
-    plan = Regrasp(lifted, patches, still=still)
-    if still.any():  # it is elsewhere then when it is touched again
+    still = resting_intervals(model, lifted, np.ones_like(lifted) if active is None else active)
+    while still.any():  # the object is elsewhere then when it is touched again
+        plan = Regrasp(lifted, patches.copy(), still=still)
         turns = turns_seen(model, straight_path(replace(model, regrasp=plan)))
         first = turns[0] @ patches[0].T
         for k, c in np.argwhere(lifted):
-            patches[k + 1 :, c] = model.touched[c].on_surface(turns[k + 1].T @ first[:, c])
-    return plan
+            plan.patches[k + 1 :, c] = model.touched[c].on_surface(turns[k + 1].T @ first[:, c])
+        far = [
+            k
+            for k in range(len(turns) - 1)
+            for c in range(model.contacts)
+            if angle_between(turns[k] @ plan.patches[k, c], first[:, c]) > FARTHEST
+        ]
+        if not far:
+            return plan
+        # What it makes up for carries a contact too far: there it does not rest.
+        begin = max(goal for goal in model.schedule.goals if goal <= far[0])
+        end = min((goal for goal in model.schedule.goals if goal > far[0]), default=len(still))
+        still[slice(begin, end) if still[begin:end].any() else slice(None)] = False
+    return Regrasp(lifted, patches)
 
 
-def resting_intervals(model: Model, lifted: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def resting_intervals(model: Model, lifted: NDArray[np.bool_], active: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """From which keyframes (N,) to the next the object rests: where a finger is off it and fewer than three hold it.
 
     Two hold an object by their fingertips' torsion alone, which is no way to swing it about. It does not rest where it
-    has to move all the way from one goal to the next, where a joint holds it, or where the palm carries it.
+    has to move all the way from one goal to the next, where a joint holds it, where it draws, or where the palm moves.
+
+    Args:
+        model: the task.
+        lifted: (N, C) who is off it from a keyframe to the next.
+        active: (N, C) who ever acts there.
     """
-    still: NDArray[np.bool_] = lifted.any(axis=1) & ((~lifted).sum(axis=1) < PINCHED)
+    still: NDArray[np.bool_] = (lifted & active).any(axis=1) & ((active & ~lifted).sum(axis=1) < LEAST_HOLDING)
     carried = np.ptp(np.hstack([model.palm_position, model.palm_quaternion]), axis=0).any()
     if model.attachment is not None or model.tool is not None or carried:
         return np.zeros_like(still)

@@ -65,7 +65,7 @@ def solve_floating(model: Model, weights: Mapping[str, float]) -> Floating:
     floating = FloatingStage(model).solve(weights)
     if model.regrasp is not None:  # as the task says
         return floating
-    first = planned_regrasp(model, floating.pose)
+    first = planned_regrasp(model, floating.pose, floating.active)
     if first is None:
         return floating
     others = (LIMITED, WALKING) if farthest_turn(model, floating.pose) <= ROLLED else (WALKING, LIMITED)

@@ -13,8 +13,8 @@ from casadi import SX
 
 from casadi_hands.geometry import norm
 from casadi_hands.geometry.bodies import Body
-from casadi_hands.nlp import Kernel
-from casadi_hands.stages.refine.declaration import Declaration
+from casadi_hands.nlp import Kernel, Rows
+from casadi_hands.stages.refine.declaration import Declaration, Knots
 from casadi_hands.stages.refine.finger_kernels import Scene, free_morphology
 from casadi_hands.terms import constraints as limits
 
@@ -24,26 +24,34 @@ _WITHIN_LIMIT = (-np.inf, 1.0)
 
 
 def bind(of: Declaration, i: int) -> None:
-    """Hold a finger to what it bears at all knots at which it touches."""
+    """Hold a finger to what it bears at all knots at which it touches, also under the task's disturbances."""
     structure = of.structure
     c, n = structure.contacts[i], structure.joints[i]
+    strength = structure.model.strength
+    assert strength is not None
+
+    def bind_at(block: str, knots: Knots, force: Rows) -> None:
+        of.bind(
+            knots,
+            borne(n, type(structure.model.touched[c])),
+            {"bearing": _WITHIN_LIMIT, "stress": _WITHIN_LIMIT, "deflection": _WITHIN_LIMIT},
+            (c,),
+            f"{block}{c}",
+            **{name: rows.constant(len(knots)) for name, rows in of.shape[i].items()},
+            pose=of.pose.take(knots),
+            point=of.point.entries(3 * i, 3 * i + 3, c).take(knots),
+            force=force.entries(3 * i, 3 * i + 3, c),
+            angles=of.angles[i].take(knots),
+            **of.scene(c, knots),
+            **of.of(c, knots, "frames"),
+            **of.at(knots, *strength.parameters),
+        )
+
     touching = np.flatnonzero(structure.touching[:, i])
-    point, force = (rows.entries(3 * i, 3 * i + 3, c) for rows in (of.point, of.force))
-    of.bind(
-        touching,
-        borne(n, type(structure.model.touched[c])),
-        {"bearing": _WITHIN_LIMIT, "stress": _WITHIN_LIMIT, "deflection": _WITHIN_LIMIT},
-        (c,),
-        f"borne{c}",
-        **{name: rows.constant(len(touching)) for name, rows in of.shape[i].items()},
-        pose=of.pose.take(touching),
-        point=point.take(touching),
-        force=force.take(touching),
-        angles=of.angles[i].take(touching),
-        **of.scene(c, touching),
-        **of.of(c, touching, "frames"),
-        **of.at(touching, *structure.model.strength.parameters if structure.model.strength else ()),
-    )
+    bind_at("borne", touching, of.force.take(touching))
+    disturbed = np.flatnonzero(structure.active[of.disturbed, i])
+    if len(disturbed):
+        bind_at("disturbed_borne", of.disturbed[disturbed], of.force_disturbed.take(disturbed))
 
 
 @cache
@@ -74,7 +82,7 @@ def borne(joints: int, kind: type[Body]) -> Kernel:
         along = (end - root) / length
         pulled = ca.dot(load, along)
         # Beyond the contact, which is on the last link, nothing bends it.
-        loaded = length if j < joints - 1 else ca.fmin(ca.dot(finger.contact - root, along), length)
+        loaded = length if j < joints - 1 else ca.fmax(ca.fmin(ca.dot(finger.contact - root, along), length), 0)
         for at in (root, root + loaded * along):
             bent, twisted = norm(_across(turning(at), along), ROUNDING), ca.dot(turning(at), along)
             normal = (norm(pulled, ROUNDING) * radius + 4 * bent) / (ca.pi * radius**3)

@@ -31,7 +31,7 @@ TOOL_TOLERANCE = 5e-3  # lengths, how far a drawing's tool may leave its path be
 LIFTING_TIE = 2.0  # of a contact to where it was planned, where it lets go in order to touch elsewhere
 SLIDING_TIE = 0.3  # of a contact to where it was planned to slide; it shall roll if it can
 RESTING = np.repeat([0.03, 0.03], 3)  # lengths/s and rad/s at most, of an object that is planned to rest
-PINCHED = 2.5  # times the lower bound on normal forces then, as torsion alone holds the object
+RESTING_GRIP = 2.5  # times the lower bound on normal forces then, as torsion alone holds the object
 ROUGHLY = 10.0  # times of what no joint may supply at knots may be so between them, where motions are interpolated
 Bounds = dict[str, tuple[ArrayLike, ArrayLike]]
 
@@ -74,11 +74,12 @@ class RefineValues:
         the motion needs, or a motion in a plane meets some of them twice, equations would have no solver's solution.
         """
         structure, model, times = self.structure, self.model, self.model.schedule.samples
+        firmer = max(margin.normal_force, min(RESTING_GRIP * margin.normal_force, model.force_limit / 2))
+        pressing = np.where(self.resting, firmer, margin.normal_force)
         always: Bounds = {}
         exact: Bounds = {}
         for i, c in enumerate(structure.contacts):
-            floor = margin.normal_force * force_ramp(self.bearing[:, i], times) * np.where(self.resting, PINCHED, 1.0)
-            floor = floor[structure.touching[:, i]]
+            floor = (pressing * force_ramp(self.bearing[:, i], times))[structure.touching[:, i]]
             always[f"contact{c}.pressing"] = (floor[:, None], np.inf)
             # The point stays on the object's surface, where its force acts; the link may be a little off it.
             exact[f"contact{c}.on_link"] = (-model.gap_tolerance, model.gap_tolerance)

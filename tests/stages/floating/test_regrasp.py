@@ -74,9 +74,7 @@ def test_only_the_contact_off_the_axis_lets_go_and_takes_the_object_where_it_fir
     # 42.5 degrees a keyframe: 127.5 are too many, so it lifts at the second and touches at the third.
     np.testing.assert_array_equal(np.argwhere(plan.lifted), [[2, 2]])
     np.testing.assert_allclose(plan.patches[:3], np.tile(model.patches, (3, 1, 1)))
-    # Two hold it meanwhile, so it rests.
-    turned = Rotation.from_rotvec(straight_path(replace(model, regrasp=plan))[3, 3:])
-    assert turned.magnitude() == pytest.approx(np.radians(170) * 2 / 3)
+    turned = Rotation.from_rotvec(pose[3, 3:])
     direction = turned.apply(plan.patches[3, 2])
     first = model.patches[2]
     # The object's axis has another direction then: on its surface, as near as that lets it be.
@@ -90,16 +88,33 @@ def test_only_the_contact_off_the_axis_lets_go_and_takes_the_object_where_it_fir
 
 
 def test_the_object_rests_while_two_hold_it_and_makes_up_for_it() -> None:
-    model = turning(170)
+    model = turning(140)
     plan = planned_regrasp(model, straight_path(model))
     assert plan is not None
     planned = replace(model, regrasp=plan)
-    degrees = np.degrees(straight_path(planned)[:, 4])
-    np.testing.assert_allclose(degrees, [0, 170 / 3, 340 / 3, 340 / 3, 170], atol=1e-9)
+    pose = straight_path(planned)
+    np.testing.assert_allclose(np.degrees(pose[:, 4]), [0, 140 / 3, 280 / 3, 280 / 3, 140], atol=1e-9)
+    # It is touched again where it then is, near where the finger first took it.
+    seen = Rotation.from_rotvec(pose[3, 3:]).apply(plan.patches[3, 2])
+    cosine = seen @ model.patches[2] / np.linalg.norm(seen) / np.linalg.norm(model.patches[2])
+    assert np.arccos(cosine) < np.radians(20)
     times = model.schedule.samples
     np.testing.assert_array_equal(resting(planned), (times > 2 - 1e-9) & (times < 3 + 1e-9))
     assert not resting(model).any()
     assert not resting(replace(model, regrasp=replace(plan, still=None))).any()
+
+
+@pytest.mark.parametrize("degrees", [134, 145, 155, 170, 180])
+def test_it_makes_up_for_no_rest_that_would_carry_a_contact_too_far(degrees: float) -> None:
+    model = turning(degrees)
+    plan = planned_regrasp(model, straight_path(model))
+    assert plan is not None
+    assert plan.lifted.any()
+    turns = Rotation.from_rotvec(straight_path(replace(model, regrasp=plan))[:, 3:])
+    first = model.patches[2] / np.linalg.norm(model.patches[2])
+    seen = np.array([turn.apply(patch) for turn, patch in zip(turns, plan.patches[:, 2], strict=True)])[:-1]
+    assert np.arccos(seen @ first / np.linalg.norm(seen, axis=1)).max() <= FARTHEST
+    assert (plan.still is not None) == (degrees * 2 / 3 < 100)
 
 
 @pytest.mark.parametrize(
@@ -119,9 +134,14 @@ def test_it_rests_where_fewer_than_three_hold_it_and_it_has_time_to_move(
     for k, c in lifted:
         flags[k, c] = True
     model = turning(170)
-    assert np.flatnonzero(resting_intervals(model, flags)).tolist() == rests
+    acts = np.ones_like(flags)
+    assert np.flatnonzero(resting_intervals(model, flags, acts)).tolist() == rests
+    # One that never acts, as the ground of an object in the air, does not hold it.
+    idle = np.zeros((5, 1), bool)
+    found = resting_intervals(model, np.hstack([flags, idle]), np.hstack([acts, idle]))
+    assert np.flatnonzero(found).tolist() == rests
     carried = replace(model, palm_position=model.palm_position + np.linspace(0, 1, len(model.palm_position))[:, None])
-    assert not resting_intervals(carried, flags).any()
+    assert not resting_intervals(carried, flags, acts).any()
 
 
 def ball() -> Model:

@@ -86,7 +86,7 @@ class Pressed:
         return [Load(len(self.bars) - 1, self.at[None], force[None], np.zeros((1, 3)), station)]
 
 
-@pytest.mark.parametrize("along", [0.4, 0.9, 1.1])
+@pytest.mark.parametrize("along", [-0.05, 0.4, 0.9, 1.1])
 @pytest.mark.parametrize("joints", [1, 2, 3])
 @pytest.mark.parametrize("seed", range(3))
 def test_the_stage_and_the_audit_find_the_same(joints: int, seed: int, along: float) -> None:
