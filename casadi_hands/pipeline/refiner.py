@@ -92,7 +92,7 @@ class Refiner:
             design, other, halved = self._borne(whole, found, short, planned)
             if design.status == "certified":
                 judged, refined, stage = design, other, halved
-        judged, refined = self._played(whole, (judged, refined, stage), short, planned)
+        judged, refined = self._played(whole, (judged, refined, stage), short, planned, AIM)
         grips = [(largest, "firmer"), (margins.firmer, "little firmer")]
         if judged.least_stiffness > HARDLY * self.record.task.actuator.stiffness or judged.share_of_torque > STRAINED:
             grips = [(margins.softer, "softer"), (margins.looser, "little softer")]
@@ -104,7 +104,8 @@ class Refiner:
             other = self._with_margin(whole, refined, stage, another, text)
             found = self._judged(stage.model, other, short, planned), other, stage
             held, other, strong = self._borne(whole, found, short, planned)
-            design, other = self._played(whole, (held, other, strong), short, planned)
+            most = self.record.task.limits.replay_angle
+            design, other = self._played(whole, (held, other, strong), short, planned, most)
             best = min(best, (design, other), key=lambda each: rank_of(each[0]))
             if best[0].status == "certified" or (held.status == "certified" and not _in_between(judged, design)):
                 break
@@ -170,12 +171,15 @@ class Refiner:
         return min(found, borne, key=lambda each: rank_of(each[0]))
 
     def _played(
-        self, whole: WholeHand, found: Tried, short: tuple[Reason, ...], planned: Design
+        self, whole: WholeHand, found: Tried, short: tuple[Reason, ...], planned: Design, most: float
     ) -> tuple[Design, Refined]:
-        """A motion replayed; where it turns off its goals, or one whose slow spins are resisted in full if better."""
+        """A motion replayed or, where it turns off a goal by more than ``most`` degrees, the better of it and another.
+
+        The other one's slow spins are resisted in full.
+        """
         judged, refined, stage = found
         judged = self._replayed(judged)
-        if not refined.exact or not self.model.torsion or judged.replay_angle <= AIM:
+        if not refined.exact or not self.model.torsion or judged.replay_angle <= most:
             return judged, refined
         with self.record.stage("refine", f"again, slow spins resisted in full: {judged.replay_words}"):
             sharp = self._attempt(whole, refined.margin, partial(stage.sharpened, refined))
