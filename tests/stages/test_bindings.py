@@ -24,6 +24,7 @@ from casadi_hands.nlp.arguments import Argument, arguments_by_name
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.regrasp import Regrasp
 from casadi_hands.problem.si import build_model
+from casadi_hands.problem.strength import Strength
 from casadi_hands.problem.structure import Structure
 from casadi_hands.stages.floating.stage import FloatingStage
 from casadi_hands.stages.refine.problem import RefineProblem
@@ -109,6 +110,9 @@ BUILD: dict[str, Callable[[], object]] = {
     ),
     "refine, servos": lambda: refine(replace(everything()[1], servo=0.4), (0, 1, 2), (2, 2, 3)),
     "refine, shared motors": lambda: refine(replace(everything()[1], motors=2), (0, 1, 2), (2, 2, 3)),
+    "refine, what it bears": lambda: refine(
+        replace(everything()[1], strength=Strength(0.5, 90.0, 0.02, 4e4)), (0, 1, 2), (2, 2, 3)
+    ),
     "refine, on a joint": lambda: refine(turned_on_its_shaft(), (0, 1, 2), (2, 2, 3)),
     "refine, drawing": lambda: refine(drawing()[1], (0, 1), (3, 3)),
     "refine, one joint": lambda: refine(drawing()[1], (1, 0), (1, 1)),
