@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from casadi_hands.problem.model import Model
 
+LEAST_HOLDING = 3  # contacts: between fewer an object turns as it likes
 APART = 0.1  # s, how far at most the times are apart at which fingers are kept clear of each other
 
 
@@ -93,7 +94,7 @@ class Structure:
     @property
     def pinched(self) -> bool:
         """Whether two contacts ever hold the object alone: torsion alone then resists a turn about the line of both."""
-        return bool(self.active.sum(axis=1).min() < 3)
+        return bool(self.active.sum(axis=1).min() < LEAST_HOLDING)
 
     @cached_property
     def middles(self) -> Inner:

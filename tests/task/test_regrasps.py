@@ -13,18 +13,16 @@ from casadi_hands.errors import TaskError
 from casadi_hands.problem.holds import shortened_task
 from casadi_hands.problem.si import build_model
 from casadi_hands.task import Task, parse_task, task_to_yaml
+from tests.pencil import pencil
 
-WALK = """
-object: {mass: 0.03, shapes: [{capsule: {start: [0, 0, -0.05], end: [0, 0, 0.05], radius: 0.006}}]}
-palm: {radius: 0.045, position: [0, 0, 0.11], facing: [0, 0, -1]}
-motion:
-  - {at: 0, position: [0, 0, 0]}
-  - {at: 8, position: [0, 0, 0]}
-fingers:
+WALK = pencil(
+    8,
+    """\
   east: {touches: [0.006, 0, 0.04], regrasps: REGRASPS}
   west: {touches: [-0.006, 0, 0.04]}
   north: {touches: [0, 0.006, 0.04], regrasps: [{from: 4, to: 5, touches: [0, 0.006, 0.02]}]}
-"""
+""",
+)
 
 
 TWICE = "[{from: 1, to: 2, touches: [0.008, 0, 0]}, {from: 6, to: 7, touches: [0.006, 0, -0.02]}]"

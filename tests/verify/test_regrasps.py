@@ -10,18 +10,18 @@ import pytest
 
 from casadi_hands.task import parse_task
 from casadi_hands.verify.checks.motion import regrasp_problems
+from tests.pencil import pencil
 
-TASK = parse_task("""
-object: {mass: 0.03, shapes: [{capsule: {start: [0, 0, -0.05], end: [0, 0, 0.05], radius: 0.006}}]}
-palm: {radius: 0.045, position: [0, 0, 0.11], facing: [0, 0, -1]}
-motion:
-  - {at: 0, position: [0, 0, 0]}
-  - {at: 4, position: [0, 0, 0]}
-fingers:
+TASK = parse_task(
+    pencil(
+        4,
+        """\
   east: {touches: [0.006, 0, 0.04], regrasps: [{from: 1, to: 2, touches: [0.006, 0, 0]}]}
   west: {touches: [-0.006, 0, 0.04]}
   north: {touches: [0, 0.006, 0.04]}
-""")
+""",
+    )
+)
 
 
 def folder(**changes: Any) -> Any:

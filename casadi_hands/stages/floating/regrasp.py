@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from casadi_hands.problem.model import Model, palm_from_world
 from casadi_hands.problem.regrasp import Regrasp
+from casadi_hands.problem.structure import LEAST_HOLDING
 from casadi_hands.stages.object_motion.values import straight_path
 
 Array = NDArray[np.float64]
 # That a contact travels around the object, seen from the palm: beyond it fingers reach around.
 FARTHEST = np.radians(100)
-LEAST_HOLDING = 3  # contacts: between fewer an object turns as it likes
 MOST_TRAVEL = np.radians(60)  # likewise, of contacts that cannot be regrasped: near enough for fingers to roll on
 
 

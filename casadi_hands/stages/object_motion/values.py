@@ -19,7 +19,6 @@ Array = NDArray[np.float64]
 GOAL_TOLERANCE = 5e-4  # lengths and rad, each coordinate: the task's cost alone gives way to slow accelerations
 REGRASP_ROOM = 0.15  # lengths about its patches, for a contact that is regrasped
 LANDING_ROOM = 0.11  # lengths, each coordinate, about where the task has a finger touch again: the audit allows 0.2
-PLANNED_ROOM = 0.15  # likewise about where the program has planned it: elsewhere it may have no lever to go on with
 MOST_TURN = 5.6  # rad, up to where the exponential map's coordinates are used where goals do not turn farther
 
 
@@ -113,7 +112,8 @@ def landing_bounds(model: Model, contacts: Sequence[int]) -> tuple[Array, Array]
     high = np.full((samples, len(chosen), 3), np.inf)
     low = -high
     if model.regrasp is not None:
-        room = LANDING_ROOM if model.regrasp.asked else PLANNED_ROOM
+        # Elsewhere than planned a finger may have no lever to go on with.
+        room = LANDING_ROOM if model.regrasp.asked else REGRASP_ROOM
         lifted, patches = model.regrasp.lifted[:, chosen], model.regrasp.patches[:, chosen]
         k, c = np.nonzero(lifted[:-1] & ~lifted[1:])
         at = model.schedule.keyframe_samples[k + 1]

@@ -33,7 +33,7 @@ def bind_contact(of: Declaration, i: int) -> None:
         {"on_object": (0.0, 0.0), "on_link": (0.0, 0.0), "singularity_margin": FREE, **actuated},
         (c,),
         f"contact{c}",
-        **_shape(of, i, touching),
+        **shape_at(of, i, touching),
         pose=of.pose.take(touching),
         point=point.take(touching),
         force=force.take(touching),
@@ -59,7 +59,7 @@ def _bind_disturbed(of: Declaration, i: int, actuated: Bounds, limited: bool) ->
             actuated,
             (c,),
             f"disturbed_contact{c}",
-            **_shape(of, i, knots),
+            **shape_at(of, i, knots),
             pose=of.pose.take(knots),
             point=point.take(knots),
             angles=of.angles[i].take(knots),
@@ -84,7 +84,7 @@ def bind_rolling(of: Declaration, i: int) -> None:
         {"no_slip": FREE, "slip_rate": (0.0, 0.0), "spin_rate": (0.0, 0.0)},
         (c,),
         f"rolling{c}",
-        **_shape(of, i, start),
+        **shape_at(of, i, start),
         **{
             name: (rows.take(start), rows.take(start + 1))
             for name, rows in (("pose", of.pose), ("point", point), ("angles", of.angles[i]))
@@ -103,7 +103,7 @@ def bind_rolling(of: Declaration, i: int) -> None:
         {"structural": FREE},
         (c,),
         f"inter_knot{c}",
-        **_shape(of, i, start),
+        **shape_at(of, i, start),
         pose=of.pose.combine(halves),
         point=point.combine(halves),
         angles=of.angles[i].combine(halves),
@@ -114,7 +114,7 @@ def bind_rolling(of: Declaration, i: int) -> None:
     )
 
 
-def _shape(of: Declaration, i: int, knots: Knots) -> dict[str, Rows]:
+def shape_at(of: Declaration, i: int, knots: Knots) -> dict[str, Rows]:
     """A finger's morphology, the same at all knots."""
     return {name: rows.constant(len(knots)) for name, rows in of.shape[i].items()}
 
@@ -150,14 +150,14 @@ def bind_clearance(of: Declaration, i: int) -> None:
             {"clear": (lower, np.inf), "unfolded": (0.0, np.inf)},
             (c,),
             f"{kind}{c}",
-            **_shape(of, i, knots),
+            **shape_at(of, i, knots),
             **moving,
             **palm,
             **of.at(knots, "reference", "palm_radius", "ground_height", "bodies", *_radii(model)),
             **of.of(c, knots, "frames"),
         )
 
-    away = lift(touching, model.schedule.samples)
+    away = lifted_clearance(touching, model.schedule.samples)
     for kind, where, skipped in (("apart_touching", touching, touched), ("apart", ~touching, None)):
         knots = np.flatnonzero(where)
         if len(knots):
@@ -170,7 +170,7 @@ def bind_clearance(of: Declaration, i: int) -> None:
         bind("apart_between", idle, moving, of.between(idle), 0.0, None)
 
 
-def lift(touching: NDArray[np.bool_], times: Array) -> Array:
+def lifted_clearance(touching: NDArray[np.bool_], times: Array) -> Array:
     """How much farther (S,) from the object than others a finger stays that touches it at some times (S,), lengths.
 
     An object held by the others alone gives way a little, and must not be met by the finger that goes around it.
@@ -209,7 +209,7 @@ def bind_pair(of: Declaration, i: int, j: int, guarded: bool) -> None:
     c, d = structure.contacts[i], structure.contacts[j]
 
     def bind(kind: str, knots: Knots, angles: list[Rows], least: float) -> None:
-        shapes = _shape(of, i, knots), _shape(of, j, knots)
+        shapes = shape_at(of, i, knots), shape_at(of, j, knots)
         of.bind(
             knots,
             kernels.fingers_apart(structure.joints[i], structure.joints[j], bool(structure.model.servo)),

@@ -15,6 +15,7 @@ from casadi_hands.geometry import norm
 from casadi_hands.geometry.bodies import Body
 from casadi_hands.nlp import Kernel, Rows
 from casadi_hands.stages.refine.declaration import Declaration, Knots
+from casadi_hands.stages.refine.finger_binding import shape_at
 from casadi_hands.stages.refine.finger_kernels import Scene, free_morphology
 from casadi_hands.terms import constraints as limits
 
@@ -37,7 +38,7 @@ def bind(of: Declaration, i: int) -> None:
             {"bearing": _WITHIN_LIMIT, "stress": _WITHIN_LIMIT, "deflection": _WITHIN_LIMIT},
             (c,),
             f"{block}{c}",
-            **{name: rows.constant(len(knots)) for name, rows in of.shape[i].items()},
+            **shape_at(of, i, knots),
             pose=of.pose.take(knots),
             point=of.point.entries(3 * i, 3 * i + 3, c).take(knots),
             force=force.entries(3 * i, 3 * i + 3, c),

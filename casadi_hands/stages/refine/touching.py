@@ -14,9 +14,9 @@ RAMP = 0.5  # s over which a contact that touches or lifts comes to press with i
 def resting(model: Model) -> NDArray[np.bool_]:
     """At which samples (S,) the object is planned to rest, held by two, while another finger goes around it."""
     flags, at = np.zeros(len(model.schedule.samples), bool), model.schedule.keyframe_samples
-    still = None if model.regrasp is None else model.regrasp.still
-    for k in [] if still is None else np.flatnonzero(still):
-        flags[at[k] : at[k + 1] + 1] = True
+    if model.regrasp is not None and model.regrasp.still is not None:
+        for k in np.flatnonzero(model.regrasp.still):
+            flags[at[k] : at[k + 1] + 1] = True
     return flags
 
 

@@ -28,7 +28,6 @@ from casadi_hands.stages.floating.stage import (
 )
 from casadi_hands.stages.object_motion.values import (
     LANDING_ROOM,
-    PLANNED_ROOM,
     REGRASP_ROOM,
     landing_bounds,
     point_bounds,
@@ -37,6 +36,7 @@ from casadi_hands.stages.object_motion.values import (
 from casadi_hands.stages.refine.touching import resting
 from casadi_hands.task import parse_task
 from casadi_hands.verify.checks.motion import NEAR
+from tests.pencil import pencil
 from tests.stages.example import made_up_solution, rod
 
 Array = np.ndarray
@@ -100,6 +100,16 @@ def test_the_object_rests_while_two_hold_it_and_makes_up_for_it() -> None:
     assert np.arccos(cosine) < np.radians(20)
     times = model.schedule.samples
     np.testing.assert_array_equal(resting(planned), (times > 2 - 1e-9) & (times < 3 + 1e-9))
+    # What acts at no time holds nothing: of four, one is off it and one idle.
+    acting = np.ones_like(plan.lifted)
+    acting[:, 0] = False
+    alone = planned_regrasp(model, straight_path(model), acting)
+    assert alone is not None
+    assert alone.still is not None
+    acting[:, 2] = False  # nor is one missed that is off it and would do nothing
+    idle = planned_regrasp(model, straight_path(model), acting)
+    assert idle is not None
+    assert idle.still is None
     assert not resting(model).any()
     assert not resting(replace(model, regrasp=replace(plan, still=None))).any()
 
@@ -282,19 +292,16 @@ def parse_task_weights() -> dict[str, float]:
     return dict(Weights().floating)
 
 
-WALK = """
-object: {mass: 0.03, shapes: [{capsule: {start: [0, 0, -0.05], end: [0, 0, 0.05], radius: 0.006}}]}
-palm: {radius: 0.045, position: [0, 0, 0.11], facing: [0, 0, -1]}
-motion:
-  - {at: 0, position: [0, 0, 0]}
-  - {at: 4, position: [0, 0, 0]}
-fingers:
+WALK = pencil(
+    4,
+    """\
   east: {touches: [0.006, 0, 0.04], regrasps: [{from: 1, to: 2, touches: [0.006, 0, 0.01]}]}
   west: {touches: [-0.006, 0, 0.04], regrasps: [{from: 1, to: 2, touches: [-0.006, 0, 0.01]}]}
   north: {touches: [0, 0.006, 0.04]}
   south: {touches: [0, -0.006, 0.04]}
 friction: 0.8
-"""
+""",
+)
 
 
 def test_fingers_let_go_and_touch_again_as_the_task_asks() -> None:
@@ -325,7 +332,7 @@ def test_points_are_bounded_where_fingers_are_asked_to_touch_again() -> None:
     assert np.sqrt(3) * LANDING_ROOM < NEAR
     assert model.regrasp is not None
     planned = replace(model, regrasp=replace(model.regrasp, asked=False))
-    np.testing.assert_allclose(landing_bounds(planned, (0,))[1][landing], point + PLANNED_ROOM)
+    np.testing.assert_allclose(landing_bounds(planned, (0,))[1][landing], point + REGRASP_ROOM)
     assert not np.isfinite(landing_bounds(replace(model, regrasp=None), (0, 2))).any()
     keyframes = point_bounds(model)[1].reshape(-1, 4, 3)
     assert np.isfinite(keyframes[:, :2]).all()

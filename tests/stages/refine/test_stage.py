@@ -25,7 +25,7 @@ from casadi_hands.stages.floating.stage import FloatingStage
 from casadi_hands.stages.refine import continuation
 from casadi_hands.stages.refine import stage as refine
 from casadi_hands.stages.refine.continuation import Continuation
-from casadi_hands.stages.refine.finger_binding import lift
+from casadi_hands.stages.refine.finger_binding import lifted_clearance
 from casadi_hands.stages.refine.result import Refined, Worst
 from casadi_hands.stages.refine.settings import (
     ACCEPTED,
@@ -159,13 +159,17 @@ def test_an_object_that_rests_is_slow_and_pressed_more_firmly_then(made_up: Made
     floors = [np.asarray(each.constraint_bounds(Margin(normal_force=0.8))[0][name][0]) for each in (planned, plain)]
     touching = planned.structure.touching[:, 0]
     np.testing.assert_allclose(floors[0][:, 0], floors[1][:, 0] * np.where(rests, 2.5, 1.0)[touching])
+    # With half of what a contact may press with, at most.
+    weak = RefineValues(made_up.stage.built, replace(model, regrasp=plan, force_limit=2.4))
+    floor = np.asarray(weak.constraint_bounds(Margin(normal_force=0.8))[0][name][0])
+    np.testing.assert_allclose(floor[:, 0], floors[1][:, 0] * np.where(rests, 1.5, 1.0)[touching])
 
 
 def test_a_finger_that_has_let_go_keeps_farther_off_the_object_the_longer() -> None:
     times = np.array([0.0, 0.1, 0.3, 0.6, 0.7, 1.5])
     touching = np.array([True, True, False, False, True, False])
-    np.testing.assert_allclose(lift(touching, times), [0.0, 0.0, 0.04, 0.02, 0.0, 0.06])
-    np.testing.assert_allclose(lift(np.zeros(6, bool), times), 0.06)
+    np.testing.assert_allclose(lifted_clearance(touching, times), [0.0, 0.0, 0.04, 0.02, 0.0, 0.06])
+    np.testing.assert_allclose(lifted_clearance(np.zeros(6, bool), times), 0.06)
 
 
 def test_the_longest_run_is_that_of_a_sum() -> None:

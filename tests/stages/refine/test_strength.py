@@ -22,7 +22,9 @@ from casadi_hands.problem.outcome import whole_hand_motion
 from casadi_hands.problem.resampling import resampled, resampled_model
 from casadi_hands.problem.si import build_model, hand_of, joint_loads
 from casadi_hands.problem.strength import Strength
+from casadi_hands.problem.structure import Structure
 from casadi_hands.stages.refine import strength
+from casadi_hands.stages.refine.problem import RefineProblem
 from casadi_hands.stages.refine.settings import ALL_STEPS
 from casadi_hands.stages.refine.stage import RefineStage
 from casadi_hands.stages.refine.values import Margin
@@ -32,7 +34,7 @@ from casadi_hands.verify.figures.structure import Bar, Load, bearing_loads, link
 from casadi_hands.verify.report import Audit
 from tests.pipeline.test_warm_start import HELD, earlier
 from tests.stages.blocks import Place, check_block, frames, numbers, random_finger, shape
-from tests.stages.example import PinFinger, everything_text
+from tests.stages.example import PinFinger, everything, everything_text
 
 Array = np.ndarray
 RADIUS, TIP, YOUNG = 0.15, 0.2, 40.0
@@ -104,6 +106,17 @@ def test_the_stage_and_the_audit_find_the_same(joints: int, seed: int, along: fl
 @pytest.mark.parametrize("joints", [1, 2, 3])
 def test_derivatives(joints: int) -> None:
     check_block(strength.borne(joints, Capsule), *Pressed(joints, 5, 0.8).block)
+
+
+def test_forces_under_disturbances_are_held_to_it_as_well() -> None:
+    model = replace(everything()[1], strength=Strength(0.5, 90.0, 0.02, 4e4))
+    active = np.ones((len(model.schedule.samples), model.contacts + 1), bool)
+    active[2:7, 0] = False
+    built = RefineProblem(Structure.of(model, (0, 1, 2), (2, 2, 3), active))
+    for i, c in enumerate(built.structure.contacts):
+        pushed = built.disturbed[built.structure.active[built.disturbed, i]]
+        assert len(pushed)
+        np.testing.assert_array_equal(built.blocks[f"disturbed_borne{c}"].knots, pushed)
 
 
 def test_limits_in_the_stages_numbers_are_those_of_the_task() -> None:
