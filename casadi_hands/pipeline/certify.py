@@ -40,6 +40,9 @@ class Certifier:
         search: run on, where fingers need more joints.
         judge: of the designs.
         jobs: processes for the replays.
+
+    Attributes:
+        failed: joints of each finger of hands that were not certified.
     """
 
     def __init__(
@@ -47,6 +50,7 @@ class Certifier:
     ) -> None:
         self.record, self.model, self.floating, self.search = record, model, floating, search
         self.judge, self.refiner = judge, Refiner(record, model, judge, jobs)
+        self.failed: set[tuple[int, ...]] = set()
 
     def run(self, found: Found) -> Design:
         """Refine the best hand, the next best, then hands with one more joint where those failed.
@@ -73,6 +77,7 @@ class Certifier:
                 if judged.status == "certified":
                     return best
                 self.record.log("refine", f"not certified: {judged.reason}")
+                self.failed.add(candidate.joints)
                 failing |= failing_fingers(self.model, refined)
                 touching = np.ones((1, len(candidate.joints)), bool)
                 if refined.barely_rolls and mobility(candidate.joints, touching) < MOBILE:

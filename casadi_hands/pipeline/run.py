@@ -259,9 +259,17 @@ def _run(record: Record, until: str, executor: Executor | None, jobs: int) -> De
 
 
 def _certified(certifier: Certifier, found: Found) -> Design:
-    """The best design of the hands of a search, with as few joints as move."""
-    pruner = Pruner(certifier.record, certifier.search, lambda candidate: certifier.certify(candidate)[0])
-    return pruner.run(certifier.run(found))
+    """The best design of the hands of a search, with as few joints as move and, each with a motor, as are needed.
+
+    Where motors are shared, it is these that are to be few; where contacts must go far with the object, fingers need
+    their joints.
+    """
+    design = certifier.run(found)
+    spare = certifier.record.task.motors == "independent" and not rolls_far(certifier.model)
+    pruner = Pruner(
+        certifier.record, certifier.search, lambda each: certifier.certify(each)[0], spare, certifier.failed
+    )
+    return pruner.run(design)
 
 
 def _stopped(record: Record, stage: str) -> Design:

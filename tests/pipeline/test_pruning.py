@@ -1,4 +1,4 @@
-"""Joints that hardly move are left out where a hand without them is certified; nothing is solved."""
+"""Joints are left out where a hand without them is certified; nothing is solved."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from casadi_hands.export.design import Design
-from casadi_hands.pipeline.pruning import HOPELESS, Pruner, fewer_joints
+from casadi_hands.pipeline.pruning import HOPELESS, Pruner, fewer_joints, spare_joints
 from casadi_hands.pipeline.record import Record
 from tests.export.example import example_hand, example_motion, example_task
 
@@ -49,6 +49,21 @@ def test_fingers_with_idle_joints_are_to_have_one_less(
     assert fewer_joints(moving(degrees)) == tried
 
 
+@pytest.mark.parametrize(
+    ("degrees", "tried"),
+    [
+        ([[MOVING, MOVING], [MOVING]], []),
+        ([[MOVING, MOVING, MOVING], [MOVING, 1.0]], [(2, 2)]),
+        ([[40, 50, 60], [50, 20, 60]], [(2, 2), (3, 2), (2, 3)]),
+        ([[20, 50, 60, 70], [50, 40, 60]], [(3, 2), (3, 3), (4, 2)]),
+    ],
+)
+def test_fingers_of_more_than_two_joints_may_have_one_to_spare(
+    degrees: list[list[float]], tried: list[tuple[int, ...]]
+) -> None:
+    assert spare_joints(moving(degrees)) == tried
+
+
 class Search:
     """Hands as they are asked for."""
 
@@ -65,11 +80,21 @@ class Search:
         return [{"stage": "synthesis"}]
 
 
-def pruned(start: Design, certified: dict[tuple[int, ...], Design], score: float = 0.2) -> tuple[Design, Search]:
+def pruned(
+    start: Design,
+    certified: dict[tuple[int, ...], Design],
+    score: float = 0.2,
+    spare: bool = False,
+    failed: list[tuple[int, ...]] | None = None,
+) -> tuple[Design, Search]:
     search: Any = Search(score)
     record = Record(start.task, None, lambda _: None)
-    failed = moving([[MOVING], [MOVING]], "feasible")
-    found = Pruner(record, search, lambda candidate: certified.get(candidate.joints, failed)).run(start)
+    refused = moving([[MOVING], [MOVING]], "feasible")
+
+    def certify(candidate: Any) -> Design:
+        return certified.get(candidate.joints, refused)
+
+    found = Pruner(record, search, certify, spare, failed or ()).run(start)
     assert len(record.design.stages) == len(search.asked)
     return found, search
 
@@ -111,3 +136,37 @@ def test_only_certified_hands_are_made_simpler() -> None:
     found, search = pruned(start, {})
     assert found is start
     assert search.asked == []
+
+
+def of(*joints: int, moved: float = MOVING) -> Design:
+    """A design with so many joints a finger, which all move."""
+    return moving([[moved] * n for n in joints])
+
+
+def asked(search: Search) -> list[tuple[int, ...]]:
+    return [tuple(joints.values()) for joints in search.asked]
+
+
+def test_fewer_joints_are_tried_where_hands_with_them_may_do() -> None:
+    start, fewer = of(3, 3), of(2, 3)
+    found, search = pruned(start, {(2, 3): fewer}, spare=True)
+    assert found is fewer
+    # From there not 2+2 again.
+    assert asked(search) == [(2, 2), (2, 3)]
+    assert pruned(start, {(2, 3): fewer})[0] is start
+
+
+def test_what_was_not_certified_is_not_tried_again_nor_what_has_fewer_joints_everywhere() -> None:
+    start, fewer = of(4, 3), of(3, 3)
+    found, search = pruned(start, {(3, 3): fewer}, spare=True, failed=[(3, 2)])
+    assert found is fewer
+    # Nor is 2+2, as no finger of it has more joints than with 3+2.
+    assert asked(search) == [(3, 3), (2, 3)]
+
+
+def test_an_idle_joint_goes_whatever_came_of_hands_with_more() -> None:
+    start, fewer = moving([[MOVING, MOVING], [MOVING, 1.0]]), moving([[MOVING, MOVING], [MOVING]])
+    found, search = pruned(start, {(2, 1): fewer}, spare=True, failed=[(2, 3)])
+    assert found is fewer
+    assert asked(search) == [(2, 1)]
+    assert pruned(start, {(2, 1): fewer}, failed=[(2, 1)])[0] is start
