@@ -93,12 +93,13 @@ class Refiner:
             if design.status == "certified":
                 judged, refined, stage = design, other, halved
         judged, refined = self._played(whole, (judged, refined, stage), short, planned, AIM)
-        grips = [(largest, "firmer"), (margins.firmer, "little firmer")]
+        firmer, softer = (margins.firmer, "little firmer"), (margins.looser, "little softer")
+        (another, which), between, other_way = (largest, "firmer"), firmer, softer
         if judged.least_stiffness > HARDLY * self.record.task.actuator.stiffness or judged.share_of_torque > STRAINED:
-            grips = [(margins.softer, "softer"), (margins.looser, "little softer")]
+            (another, which), between, other_way = (margins.softer, "softer"), softer, firmer
         best, enough = (judged, refined), not judged.drops and judged.replay_angle <= AIM
-        for another, which in grips:
-            if enough or refined.margin == another:
+        for _ in range(0 if enough else 2):
+            if refined.margin == another:
                 break
             text = f"again with a {which} grip: {judged.replay_words}"
             other = self._with_margin(whole, refined, stage, another, text)
@@ -107,9 +108,13 @@ class Refiner:
             most = self.record.task.limits.replay_angle
             design, other = self._played(whole, (held, other, strong), short, planned, most)
             best = min(best, (design, other), key=lambda each: rank_of(each[0]))
-            if best[0].status == "certified" or (held.status == "certified" and not _in_between(judged, design)):
+            if best[0].status == "certified":
                 break
             self.record.log("refine", f"not with a {which} grip: {design.reason}")
+            worse = judged.missed == {"replay_dropped"} and (design.drops or 0) > (judged.drops or 0)
+            if held.status == "certified" and not worse and not _in_between(judged, design):
+                break
+            another, which = other_way if worse else between
         return best
 
     def _exact(
@@ -173,18 +178,23 @@ class Refiner:
     def _played(
         self, whole: WholeHand, found: Tried, short: tuple[Reason, ...], planned: Design, most: float
     ) -> tuple[Design, Refined]:
-        """A motion replayed or, where it turns off a goal by more than ``most`` degrees, the better of it and another.
+        """A motion replayed or, where it turns off a goal by more than ``most`` degrees, the best of it and others.
 
-        The other one's slow spins are resisted in full.
+        Those resist slower and slower spins in full.
         """
         judged, refined, stage = found
         judged = self._replayed(judged)
+        best, latest = (judged, refined), refined
         if not refined.exact or not self.model.torsion or judged.replay_angle <= most:
-            return judged, refined
-        with self.record.stage("refine", f"again, slow spins resisted in full: {judged.replay_words}"):
-            sharp = self._attempt(whole, refined.margin, partial(stage.sharpened, refined))
-        design = self._replayed(self._judged(stage.model, sharp, short, planned))
-        return (design, sharp) if rank_of(design) < rank_of(judged) else (judged, refined)
+            return best
+        for sharpness in range(1, stage.sharper + 1):
+            if best[0].replay_angle <= most or not latest.exact:
+                break
+            with self.record.stage("refine", f"again, slow spins resisted in full: {best[0].replay_words}"):
+                latest = self._attempt(whole, refined.margin, partial(stage.sharpened, latest, sharpness))
+            design = self._replayed(self._judged(stage.model, latest, short, planned))
+            best = min(best, (design, latest), key=lambda each: rank_of(each[0]))
+        return best
 
     def _with_margin(
         self, whole: WholeHand, refined: Refined, stage: Continuation, margin: Margin, why: str

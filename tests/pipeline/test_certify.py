@@ -264,6 +264,7 @@ class Ways:
 
     contacts, joints, active, model = (0, 1), (1, 1), None, None
     exact = True  # with what links bear as a limit, too
+    sharper = 1
 
     def __init__(self, firm: bool) -> None:
         self.firm, self.passes = firm, False
@@ -289,8 +290,8 @@ class Ways:
         assert (homotopy, margin, larger) == (0.5, AMPLE, LARGE)
         return self.taken("continue_from", larger if self.firm else margin)
 
-    def sharpened(self, exact: Any, margin: Margin) -> Any:
-        return self.taken("sharpened", margin)
+    def sharpened(self, exact: Any, sharpness: int, margin: Margin) -> Any:
+        return self.taken("sharpened" if sharpness == 1 else f"sharpened to {sharpness}", margin)
 
     def with_margin(self, exact: Any, margin: Margin) -> Any:
         return self.taken("with_margin", margin)
@@ -360,7 +361,7 @@ def refine(
 @pytest.mark.parametrize("homotopy", [1.0, 0.5])
 @pytest.mark.parametrize(
     ("drops", "kept"),
-    [([4, 1], LARGE), ([4, 3], LARGE), ([1, 0], LARGE), ([4, 4], AMPLE), ([4, 5], AMPLE), ([0], AMPLE)],
+    [([4, 1], LARGE), ([4, 3], LARGE), ([1, 0], LARGE), ([4, 4], AMPLE), ([0], AMPLE)],
 )
 def test_a_firmer_grip_is_tried_where_replays_drop_and_kept_where_they_drop_less(
     monkeypatch: pytest.MonkeyPatch, homotopy: float, drops: list[int], kept: Margin
@@ -391,7 +392,7 @@ def test_a_little_firmer_grip_is_tried_where_hands_cannot_grip_so_firmly(
 
 
 @pytest.mark.parametrize(
-    ("drops", "kept"), [([4, 2, 1], LOOSER), ([4, 2, 3], SOFT), ([2, 3, 1], LOOSER), ([4, 3], SOFT), ([2, 1], SOFT)]
+    ("drops", "kept"), [([4, 2, 1], LOOSER), ([4, 2, 3], SOFT), ([2, 2, 1], LOOSER), ([4, 3], SOFT), ([2, 1], SOFT)]
 )
 def test_where_hardly_too_many_replays_drop_a_grip_in_between_is_tried(
     monkeypatch: pytest.MonkeyPatch, drops: list[int], kept: Margin
@@ -401,6 +402,19 @@ def test_where_hardly_too_many_replays_drop_a_grip_in_between_is_tried(
     tried = [SOFT, LOOSER][: len(drops) - 1]
     assert refine(monkeypatch, ways, 1.0, ["certified"] * len(drops), drops, stiffness=0.4) == (kept, min(drops))
     assert ways.asked == [("solve", AMPLE), *(("with_margin", margin) for margin in tried)]
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "tried"), [(0.1, [LARGE, LOOSER]), (0.4, [SOFT, FIRMER])], ids=["firmer", "softer"]
+)
+@pytest.mark.parametrize(("drops", "kept"), [([2, 3, 1], 1), ([4, 5, 2], 1), ([2, 5, 4], None), ([4, 5, 6], None)])
+def test_where_a_grip_drops_the_object_more_often_one_the_other_way_is_tried(
+    monkeypatch: pytest.MonkeyPatch, drops: list[int], kept: int | None, stiffness: float, tried: list[Margin]
+) -> None:
+    ways = Ways(firm=False)
+    margin, left = refine(monkeypatch, ways, 1.0, ["certified"] * 3, drops, stiffness=stiffness)
+    assert (margin, left) == (AMPLE if kept is None else tried[kept], min(drops))
+    assert ways.asked == [("solve", AMPLE), *(("with_margin", each) for each in tried)]
 
 
 @pytest.mark.parametrize(
@@ -510,6 +524,23 @@ def test_another_grip_is_tried_where_the_replay_as_planned_ends_off_its_goals(mo
     ways = Ways(firm=False)
     refine(monkeypatch, ways, 1.0, ["certified"] * 3, [0, 0, 0], angle=4.0, soft=True)
     assert ways.asked == [("solve", AMPLE), ("sharpened", AMPLE), ("with_margin", LARGE)]
+
+
+@pytest.mark.parametrize(
+    ("angles", "kept"), [([9.0, 2.0], 2.0), ([9.0, 8.0, 2.0], 2.0), ([9.0, 4.0, 4.5], 4.0), ([9.0, 4.0, 2.0], 2.0)]
+)
+def test_slower_and_slower_spins_are_resisted_until_the_replay_keeps_its_goals(
+    monkeypatch: pytest.MonkeyPatch, angles: list[float], kept: float
+) -> None:
+    ways, off = Ways(firm=False), list[float]()
+    ways.sharper = 2
+    # A firmer grip is no better.
+    more = [4.5] if kept > 3 else []
+    count = len(angles) + len(more)
+    refine(monkeypatch, ways, 1.0, ["certified"] * count, [0] * count, angles=[*angles, *more], soft=True, off=off)
+    assert off == [kept]
+    sharper = [("sharpened", AMPLE), ("sharpened to 2", AMPLE)][: len(angles) - 1]
+    assert ways.asked == [("solve", AMPLE), *sharper, *[("with_margin", LARGE)] * len(more)]
 
 
 @pytest.mark.parametrize(("angle", "kept"), [(2.0, 2.0), (8.0, 8.0), (10.0, 9.0)])

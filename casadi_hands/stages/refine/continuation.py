@@ -29,6 +29,7 @@ from casadi_hands.stages.refine.settings import (
     LAST_STEP,
     NEARBY_STEPS,
     RENEWED_STEPS,
+    SHARP,
     STIFF_PENALTY,
     Step,
 )
@@ -117,14 +118,21 @@ class Continuation:
         """
         return _until_met(partial(self.fine.take, steps, start, margin) for steps in (RENEWED_STEPS, LAST_STEP))
 
-    def sharpened(self, exact: Refined, margin: Margin) -> Refined:
+    @property
+    def sharper(self) -> int:
+        """How many times motions can be sharpened."""
+        return len(SHARP) - 1 - self.fine.structure.pinched
+
+    def sharpened(self, exact: Refined, sharpness: int, margin: Margin) -> Refined:
         """Refine an exact motion such that contacts which spin slowly have their torsion at its limit, too.
 
         Args:
             exact: the motion, at the task's samples.
+            sharpness: how many times it has been sharpened then, at most ``sharper``.
             margin: to keep to the limits.
         """
-        return replace(self.fine.take(LAST_STEP, exact.hand, margin, sharp=True), barely_rolls=exact.barely_rolls)
+        sharp = self.fine.take(LAST_STEP, exact.hand, margin, sharpness=sharpness)
+        return replace(sharp, barely_rolls=exact.barely_rolls)
 
     def with_margin(self, exact: Refined, margin: Margin) -> Refined:
         """Refine a motion that is exact with another margin.

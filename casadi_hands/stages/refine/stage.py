@@ -34,7 +34,6 @@ from casadi_hands.stages.refine.settings import (
     HOPELESS,
     MET,
     RESTORATION,
-    SHARP,
     SPIN_SCALE,
     SPIN_WEIGHT,
     Step,
@@ -103,7 +102,7 @@ class RefineStage:
         margin: Margin,
         homotopy: float = 1.0,
         wanted: WholeHand | None = None,
-        sharp: bool = False,
+        sharpness: int = 0,
     ) -> Refined:
         """Solve step by step; not to the end where stiff penalties show rolling to be out of reach.
 
@@ -113,10 +112,10 @@ class RefineStage:
             margin: to keep to the limits.
             homotopy: the parameter: 0 where the object stays at its first goal, 1 where it reaches all of them.
             wanted: the motion, of the same hand, that costs hold near to; by default that to begin with.
-            sharp: whether contacts that spin slowly have their torsion at its limit, too.
+            sharpness: how many times slower contacts that have their torsion at its limit may spin than at first.
         """
         given = self.given if homotopy == 1 else RefineValues(self.built, shortened(self.model, homotopy))
-        values, parameters = given.start(start), given.parameters(start, margin, wanted)
+        values, parameters = given.start(start, sharpness), given.parameters(start, margin, wanted)
         lower, upper = given.bounds()
         always, exact = given.constraint_bounds(margin)
         directions, regular = given.singularity_margins(start)
@@ -143,7 +142,7 @@ class RefineStage:
                 off = 1.0 if self.model.sliding else scale
                 low, high, lines = self._coupled(what, values, start.coupling, off)
                 lower, upper, bounds = lower | low, upper | high, {**bounds, **lines}
-            parameters |= self._weighted(weights) | self._slip_scale(scale) | self._spin_scale(what, sharp)
+            parameters |= self._weighted(weights) | self._slip_scale(scale) | self._spin_scale(what, sharpness)
             solution = self.solver.solve(values, parameters, options, lower, upper, bounds)
             if what == "hard constraints" and not solution.violation <= MET:
                 solution = self._restored(solution, parameters, lower, upper, bounds)
@@ -198,9 +197,10 @@ class RefineStage:
     def _weighted(self, weights: Mapping[str, float]) -> dict[str, ArrayLike]:
         return {f"weight.{term}": weights[term] / self.given.knots for term in self.problem.terms}
 
-    def _spin_scale(self, what: str, sharp: bool) -> dict[str, ArrayLike]:
-        sharp = what == "hard constraints" and (sharp or self.structure.pinched)
-        return {"spin_scale": SHARP if sharp else SPIN_SCALE[what]} if self.model.torsion else {}
+    def _spin_scale(self, what: str, sharpness: int) -> dict[str, ArrayLike]:
+        if not self.model.torsion:
+            return {}
+        return {"spin_scale": self.given.spin_scale(sharpness) if what == "hard constraints" else SPIN_SCALE[what]}
 
     def _slip_scale(self, times: float) -> dict[str, ArrayLike]:
         return {"slip_scale": times * SLIP_SCALE / self.model.units.length} if self.model.sliding else {}

@@ -21,7 +21,7 @@ from casadi_hands.stages.refine.coupling import start as coupling_start
 from casadi_hands.stages.refine.declaration import HOLDING
 from casadi_hands.stages.refine.initial_guess import along_joint, balanced, disturbance_wrenches, rates_and_wrenches
 from casadi_hands.stages.refine.problem import RefineProblem
-from casadi_hands.stages.refine.settings import SHARP, SPIN_SCALE
+from casadi_hands.stages.refine.settings import SHARP
 from casadi_hands.stages.refine.sliding import SLIP_SCALE, WHOLE, runs
 from casadi_hands.stages.refine.sliding import start as sliding_start
 from casadi_hands.stages.refine.touching import force_ramp, longest_run, resting
@@ -154,8 +154,13 @@ class RefineValues:
         lower["point"], upper["point"] = landing_bounds(model, self.structure.columns)
         return {"pose": low_pose, **lower, **joint_lower}, {"pose": high_pose, **upper, **joint_upper}
 
-    def start(self, motion: WholeHand) -> dict[str, Array]:
-        """Values of all variables: the motion, with velocities and forces that nearly obey it."""
+    def start(self, motion: WholeHand, sharpness: int = 0) -> dict[str, Array]:
+        """Values of all variables: the motion, with velocities and forces that nearly obey it.
+
+        Args:
+            motion: to begin with.
+            sharpness: how many times slower contacts that count as spinning may spin than at first.
+        """
         count, chosen = self.knots, self.structure.columns
         joint, freedom = self.model.attachment, None
         if joint is None:
@@ -174,7 +179,7 @@ class RefineValues:
         }
         twist = np.zeros((count, 3))
         if self.model.torsion:
-            values |= self._torsion(motion, forces)
+            values |= self._torsion(motion, forces, sharpness)
             twist = values["twist_torque"]
             values["wrench"][:, 3:] += twist
         if self.model.sliding:
@@ -194,12 +199,11 @@ class RefineValues:
             values |= coupling_start(self.built, motion.coupling)
         return values
 
-    @property
-    def _spin_scale(self) -> float:
-        """Rate of spin, rad/s, of the last solve."""
-        return SHARP if self.structure.pinched else SPIN_SCALE["hard constraints"]
+    def spin_scale(self, sharpness: int = 0) -> float:
+        """Rate of spin, rad/s, beyond which contacts count as spinning in the last solve, so many times sharpened."""
+        return SHARP[min(sharpness + self.structure.pinched, len(SHARP) - 1)]
 
-    def _torsion(self, motion: WholeHand, forces: Array) -> dict[str, Array]:
+    def _torsion(self, motion: WholeHand, forces: Array, sharpness: int) -> dict[str, Array]:
         """Values of what fingertips' torsion is made of, beside contact forces (S, C, 3)."""
         model, contacts = self.model, list(self.structure.contacts)
         count, steps = len(contacts), np.diff(model.schedule.samples)
@@ -212,7 +216,7 @@ class RefineValues:
         across = np.sum(forces[:, :count] ** 2, axis=2) - pressing**2
         most = np.sqrt(np.maximum(pressing**2 - across / model.friction**2, 1e-6))
         share = ((torsion / most)[1:] + (torsion / most)[:-1]) / 2
-        fully = spins / np.sqrt(spins**2 + self._spin_scale**2)
+        fully = spins / np.sqrt(spins**2 + self.spin_scale(sharpness) ** 2)
         holding = np.clip((share + fully) / (1 - fully**2), -HOLDING, HOLDING)
         twist = model.torsion * np.einsum("sf,fsi->si", torsion, normals)
         return {"spin": spins, "torsion": torsion, "holding": holding, "twist_torque": twist}
@@ -246,7 +250,7 @@ class RefineValues:
         values |= attached.parameters(model) | (model.strength.parameters if model.strength else {})
         if model.torsion:
             values |= {"torsion_radius": model.torsion, "sliding_friction": model.friction}
-            values["spin_scale"] = self._spin_scale
+            values["spin_scale"] = self.spin_scale()
         if model.motors:
             values["stiffness"] = model.stiffness
         if model.sliding:

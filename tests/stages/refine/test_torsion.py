@@ -203,7 +203,7 @@ def let_down(tmp_path_factory: pytest.TempPathFactory) -> LetDown:
     model = build_model(task)
     whole = warm_start(hanging(task, model.schedule.samples), task, model)
     continuation = Continuation(model, whole.contacts, (2, 2), whole.active)
-    refined = continuation.sharpened(continuation.solve(whole, Margin(), near=True), Margin())
+    refined = continuation.sharpened(continuation.solve(whole, Margin(), near=True), 1, Margin())
     built = hand_of(task, model, refined.hand.fingers, refined.hand.contacts, *joint_loads(model, refined.hand))
     design = Design(task, "feasible", hand=built, motion=whole_hand_motion(model, refined.hand))
     folder = tmp_path_factory.mktemp("let_down")
@@ -231,7 +231,7 @@ def test_where_contacts_spin_their_moments_are_at_the_limit_against_the_spin(let
     # It turns about -x: against the right contact's outward normal, and about the left one's.
     for side, c in ((-1.0, 0), (1.0, 1)):
         rates = spin_rates(let_down.folder, build_trajectory(let_down.folder, shoot(let_down.folder)), c)
-        share = rates / np.hypot(rates, SHARP)
+        share = rates / np.hypot(rates, SHARP[-1])
         quick = np.abs(rates) > 0.4
         assert np.sum(quick) >= 6
         assert np.all(-side * rates[quick] > 0.0)
