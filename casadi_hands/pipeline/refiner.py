@@ -111,7 +111,7 @@ class Refiner:
             if best[0].status == "certified":
                 break
             self.record.log("refine", f"not with a {which} grip: {design.reason}")
-            worse = judged.missed == {"replay_dropped"} and (design.drops or 0) > (judged.drops or 0)
+            worse = bool(judged.missed & design.missed) and (design.drops or 0) > (judged.drops or 0)
             if held.status == "certified" and not worse and not _in_between(judged, design):
                 break
             another, which = other_way if worse else between
