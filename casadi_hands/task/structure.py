@@ -57,8 +57,11 @@ def _section_at(path: tuple[str | int, ...]) -> type[Section] | None:
     current: Any = Task
     for step in path:
         inner = sections_in(current)
+        optional = _optional(current)
         if step in SECTIONS and SECTIONS[str(step)] in inner:
             current = SECTIONS[str(step)]
+        elif optional and step in fields_of(optional):
+            current = fields_of(optional)[str(step)].annotation
         elif isinstance(current, type) and issubclass(current, Section):
             field = fields_of(current).get(str(step))
             current = field.annotation if field else None
@@ -66,11 +69,13 @@ def _section_at(path: tuple[str | int, ...]) -> type[Section] | None:
             # An element of a list, or a name in a mapping of names.
             arguments = [part for part in get_args(_inside(current)) if part is not str and part is not Ellipsis]
             current = arguments[0] if arguments else None
-    if isinstance(current, type) and issubclass(current, Section):
-        return current
-    sections = sections_in(current)
-    optional = get_origin(current) in (Union, types.UnionType)
-    return sections[0] if optional and len(sections) == 1 else None
+    return current if isinstance(current, type) and issubclass(current, Section) else _optional(current)
+
+
+def _optional(annotation: Any) -> type[Section] | None:
+    """The one section of an annotation such as ``Section | None``."""
+    sections = sections_in(annotation)
+    return sections[0] if get_origin(annotation) in (Union, types.UnionType) and len(sections) == 1 else None
 
 
 def _inside(annotation: Any) -> Any:

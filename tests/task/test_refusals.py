@@ -51,6 +51,17 @@ SPOILT = {
         "mass: 0.1\n  weight: 1",
         "4: object.weight: given an unknown field; allowed: mass, shapes, center_of_mass, inertia, attached, meshes",
     ),
+    "unknown field of a section within one that may be missing": (
+        "mass: 0.1",
+        "mass: 0.1\n  attached: {slider: {axis: [1, 0, 0], friction: 2}}",
+        "4: object.attached.slider.friction: given an unknown field; allowed: axis, stiffness, damping, "
+        "friction_force; did you mean friction_force?",
+    ),
+    "missing field of such a section": (
+        "mass: 0.1",
+        "mass: 0.1\n  attached: {slider: {friction_force: 2}}",
+        "4: object.attached.slider.axis: given nothing; allowed: a value, it has no default: Direction of the axis...",
+    ),
     "misspelt field": (
         "  mass:",
         "  mas:",
