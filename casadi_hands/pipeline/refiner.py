@@ -180,7 +180,7 @@ class Refiner:
     ) -> tuple[Design, Refined]:
         """A motion replayed or, where it turns off a goal by more than ``most`` degrees, the best of it and others.
 
-        Those resist slower and slower spins in full.
+        Those resist slower spins in full, and slower ones again where that leaves it beyond the limit.
         """
         judged, refined, stage = found
         judged = self._replayed(judged)
@@ -194,6 +194,7 @@ class Refiner:
                 latest = self._attempt(whole, refined.margin, partial(stage.sharpened, latest, sharpness))
             design = self._replayed(self._judged(stage.model, latest, short, planned))
             best = min(best, (design, latest), key=lambda each: rank_of(each[0]))
+            most = max(most, self.record.task.limits.replay_angle)
         return best
 
     def _with_margin(

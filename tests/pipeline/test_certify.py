@@ -527,7 +527,7 @@ def test_another_grip_is_tried_where_the_replay_as_planned_ends_off_its_goals(mo
 
 
 @pytest.mark.parametrize(
-    ("angles", "kept"), [([9.0, 2.0], 2.0), ([9.0, 8.0, 2.0], 2.0), ([9.0, 4.0, 4.5], 4.0), ([9.0, 4.0, 2.0], 2.0)]
+    ("angles", "kept"), [([9.0, 2.0], 2.0), ([9.0, 8.0, 2.0], 2.0), ([9.0, 7.0, 4.5], 4.5), ([9.0, 4.0], 4.0)]
 )
 def test_slower_and_slower_spins_are_resisted_until_the_replay_keeps_its_goals(
     monkeypatch: pytest.MonkeyPatch, angles: list[float], kept: float
