@@ -48,6 +48,7 @@ def main() -> None:
     parser.add_argument("--limit", type=float, metavar="MINUTES", help="end a solve that takes longer")
     parser.add_argument("--no-solve", action="store_true", help="only show what has been solved")
     parser.add_argument("--picture", type=Path, metavar="FILE", help="write a PNG of the page's top")
+    parser.add_argument("--table", default="gallery", help="name of the record that --json writes")
     add_json(parser)
     given = parser.parse_args()
     if browser() is None:  # told before solves that take hours
@@ -66,7 +67,7 @@ def main() -> None:
         kept_solve(file, seed, "refine", given.out, given.jobs, given.limit)
         entries[file, seed] = entry_of(file, seed, given.out, given.jobs)
         write_all(list(entries.values()), given.out)
-    write_record(given.json, "gallery", HEAD, rows_of(by_task(list(entries.values()))))
+    write_record(given.json, given.table, HEAD, rows_of(by_task(list(entries.values()))))
     if given.picture:
         screenshot((given.out / PAGE).resolve().as_uri(), given.picture, PICTURE)
     print(given.out / PAGE)

@@ -89,19 +89,22 @@ class Certifier:
             self.record.log("synthesis", f"another joint for {', '.join(sorted(failing)) or 'the fingers with fewest'}")
             found = run_search(self.record, self.model, self.search, least)
 
-    def certify(self, candidate: Candidate, short: tuple[Reason, ...] = ()) -> tuple[Design, Refined]:
+    def certify(
+        self, candidate: Candidate, short: tuple[Reason, ...] = (), grips: bool = True
+    ) -> tuple[Design, Refined]:
         """Find a hand's motion and refine it; where contacts cannot go with the object, from a shorter one on.
 
         Args:
             candidate: the hand.
             short: what its fingers could not do before.
+            grips: whether other grips are tried where replays fail.
 
         Returns:
             the design, replayed where its files hold, and its refinement.
         """
         model, floating, homotopy = self._begun
         whole = run_whole_hand(self.record, model, floating, candidate)
-        return self.refiner.certify(whole, short, homotopy=homotopy)
+        return self.refiner.certify(whole, short, homotopy=homotopy, grips=grips)
 
     @cached_property
     def _begun(self) -> tuple[Model, Floating, float]:

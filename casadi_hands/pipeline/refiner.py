@@ -57,6 +57,7 @@ class Refiner:
         margin: Margin | None = None,
         near: bool = False,
         homotopy: float = 1.0,
+        grips: bool = True,
     ) -> tuple[Design, Refined]:
         """Refine one hand with a margin, and with others where that fails.
 
@@ -71,6 +72,7 @@ class Refiner:
             margin: the first to be tried; by default what suits the hand.
             near: whether the motion is nearly exact already.
             homotopy: the homotopy parameter that its motion goes to: 1 at its goals.
+            grips: whether other grips are tried where replays fail.
 
         Returns:
             the design, replayed where its files hold, and its refinement.
@@ -98,6 +100,7 @@ class Refiner:
         if judged.least_stiffness > HARDLY * self.record.task.actuator.stiffness or judged.share_of_torque > STRAINED:
             (another, which), between, other_way = (margins.softer, "softer"), softer, firmer
         best, enough = (judged, refined), not judged.drops and judged.replay_angle <= AIM
+        enough |= not grips and judged.status != "certified"
         for _ in range(0 if enough else 2):
             if refined.margin == another:
                 break

@@ -36,7 +36,7 @@ from casadi_hands.problem.model import Model
 from casadi_hands.problem.si import build_model
 from casadi_hands.stages.own_terms import try_out
 from casadi_hands.stages.refine.values import Margin
-from casadi_hands.stages.synthesis.algorithm import Found
+from casadi_hands.stages.synthesis.algorithm import Candidate, Found
 from casadi_hands.task import Task
 from casadi_hands.terms.own import OwnTerm, checked
 from casadi_hands.verify.replays.engine import load_mujoco
@@ -266,10 +266,11 @@ def _certified(certifier: Certifier, found: Found) -> Design:
     """
     design = certifier.run(found)
     spare = certifier.record.task.motors == "independent" and not rolls_far(certifier.model)
-    pruner = Pruner(
-        certifier.record, certifier.search, lambda each: certifier.certify(each)[0], spare, certifier.failed
-    )
-    return pruner.run(design)
+
+    def certify(candidate: Candidate) -> Design:
+        return certifier.certify(candidate, grips=False)[0]
+
+    return Pruner(certifier.record, certifier.search, certify, spare, certifier.failed).run(design)
 
 
 def _stopped(record: Record, stage: str) -> Design:

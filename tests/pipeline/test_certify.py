@@ -313,6 +313,7 @@ def refine(
     angles: Sequence[float] = (),
     missed: Sequence[str] = (),
     off: list[float] | None = None,
+    grips: bool = True,
 ) -> tuple[Margin, int]:
     """The margin of what is kept and its drops, where designs and drops are judged as told, in this order.
 
@@ -351,7 +352,7 @@ def refine(
     record, unused = Record(ball_task(), None, lambda _: None), SimpleNamespace()
     model = replace(build_model(ball_task()), torsion=float(soft))
     refiner = Refiner(record, model, unused, 1)  # type: ignore[arg-type]
-    design, refined = refiner.certify(whole, (), homotopy=homotopy)
+    design, refined = refiner.certify(whole, (), homotopy=homotopy, grips=grips)
     assert (next(judged, None), next(dropped, None)) == (None, None)
     if off is not None:
         off.append(design.replay_angle)
@@ -370,6 +371,15 @@ def test_a_firmer_grip_is_tried_where_replays_drop_and_kept_where_they_drop_less
     assert refine(monkeypatch, ways, homotopy, ["certified"] * len(drops), drops) == (kept, min(drops))
     first = ("solve" if homotopy == 1 else "continue_from", AMPLE)
     assert ways.asked == [first, *[("with_margin", LARGE)] * (len(drops) - 1)]
+
+
+def test_where_a_hand_is_one_of_several_that_may_do_no_other_grip_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    ways = Ways(firm=False)
+    assert refine(monkeypatch, ways, 1.0, ["certified"], [4], grips=False) == (AMPLE, 4)
+    assert ways.asked == [("solve", AMPLE)]
+    # One that is certified may grip better.
+    ways = Ways(firm=False)
+    assert refine(monkeypatch, ways, 1.0, ["certified"] * 2, [1, 0], grips=False) == (LARGE, 0)
 
 
 @pytest.mark.parametrize(("drops", "kept"), [([4, 3], SOFT), ([4, 4], AMPLE), ([0], AMPLE)])
