@@ -69,6 +69,14 @@ DEFLECTION = Constraint(
 ON_OBJECT = Constraint(
     "on_object", "eq. 2.10 as an equation", "length", "stay on the object's surface", _REACH, (*_GAP, *_BALANCE, "slip")
 )
+ON_FACE = Constraint(
+    "on_face",
+    "how far a contact is from the edges of its face",
+    "length",
+    "stay off the edges of the face that it is on",
+    "a contact farther from the edges, a smaller fingertip (fingertip.radius) or a smaller turn of the object",
+    (*_BALANCE, "friction_excess", "torsion_excess", "slip"),
+)
 ON_LINK = Constraint(
     "on_link", "eq. 2.19 as an equation", "length", "reach its contact", _REACH, (*_GAP, *_BALANCE, "slip")
 )

@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 from casadi_hands.geometry.smooth import norm
 
 Array = NDArray[np.float64]
+TILT = 3e-3
+"""Angle, rad, between a body's normal and that of a sharp face, within which these agree."""
 
 
 @dataclass(frozen=True)
@@ -114,10 +116,12 @@ class Body(ABC):
     Attributes:
         kind: its name in task files.
         width: number of parameters it packs into.
+        face_bounds: the most half-spaces that keep a point off the edges of a face; 0 of a body that has none.
     """
 
     kind: ClassVar[str]
     width: ClassVar[int]
+    face_bounds: ClassVar[int] = 0
 
     @property
     @abstractmethod
@@ -191,6 +195,16 @@ class Body(ABC):
     def impossible(self) -> str:
         """What is allowed instead, where no body is as these fields say; else empty."""
         return ""
+
+    def face(self, point: Array) -> tuple[Array, Array]:
+        """Where a contact that is on a point's face stays off its edges: in (M, 3)·p <= (M,), M at most face_bounds.
+
+        On rounded edges surfaces have other normals than on those of the files, which are sharp.
+
+        Args:
+            point: (3,) on the surface.
+        """
+        return np.zeros((0, 3)), np.zeros(0)
 
     def as_mapping(self) -> dict[str, Any]:
         """Its fields by their names in task files."""

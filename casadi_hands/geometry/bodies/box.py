@@ -12,7 +12,7 @@ import numpy as np
 from casadi import SX
 from scipy.spatial.transform import Rotation
 
-from casadi_hands.geometry.bodies.body import Array, Body, Core, Solid, Surface, edge_metadata, farthest
+from casadi_hands.geometry.bodies.body import TILT, Array, Body, Core, Solid, Surface, edge_metadata, farthest
 from casadi_hands.geometry.smooth import norm
 
 _KINK = 1e-3  # rounding of corners, a share of the half sides, and lengths
@@ -79,6 +79,7 @@ class Box(Body):
 
     kind: ClassVar[str] = "box"
     width: ClassVar[int] = 13
+    face_bounds: ClassVar[int] = 4
     center: Array = field(metadata={"about": "Middle, m, object frame.", "is": "middle"})
     size: Array = field(
         metadata={"about": "Lengths of the sides along x, y and z before it is turned, m.", "is": "sizes"}
@@ -160,6 +161,14 @@ class Box(Body):
     def on_surface(self, point: Array) -> Array:
         """See `Body`."""
         return np.asarray(point - self.signed_distance(point) * self.outward(point))
+
+    def face(self, point: Array) -> tuple[Array, Array]:
+        """See `Body`; beyond the rounded edge, what rounds the core's corners has to be far."""
+        _, beyond = self._local(point)
+        sides = np.delete(np.arange(3), np.argmax(beyond)).repeat(2)
+        ways = np.tile([1.0, -1.0], 2)[:, None] * self.turn.T[sides]
+        rounded = (_KINK * self._half) ** 2 / (2 * TILT * self.edge_radius)
+        return ways, (self._half - self.edge_radius - rounded)[sides] + ways @ self.center
 
     def support(self, direction: Array) -> Array:
         """See `Body`."""

@@ -14,7 +14,7 @@ import numpy as np
 from casadi import SX
 from scipy.spatial import QhullError
 
-from casadi_hands.geometry.bodies.body import Array, Body, Core, Solid, Surface, edge_metadata, farthest
+from casadi_hands.geometry.bodies.body import TILT, Array, Body, Core, Solid, Surface, edge_metadata, farthest
 from casadi_hands.geometry.hull import ALIKE, Hull, crossed, hull_of, mass_moments, within
 from casadi_hands.geometry.smooth import constant, norm
 
@@ -23,6 +23,8 @@ from casadi_hands.geometry.smooth import constant, norm
 _SHARPNESS = float(np.sqrt(2) * np.log(2) / (np.sqrt(2) - 1))
 _LOWEST = 1e-3  # lengths by which corners may be higher than the lowest and count for it
 _STEPS = 1000  # towards the surface; in a sharp wedge they zigzag
+_MOST_BOUNDS = 8  # of a face, those nearest to a point
+_SHARP = np.cos(np.radians(30))  # of the angle between faces: contacts may roll over blunter edges
 _ROUNDS = 30  # of moving faces until the surface goes through their middles
 
 
@@ -115,6 +117,7 @@ class Convex(Body):
     """
 
     kind: ClassVar[str] = "convex"
+    face_bounds: ClassVar[int] = _MOST_BOUNDS
     counts: ClassVar[tuple[int, int]]
     vertices: Array = field(metadata={"about": "Its corners, m, object frame; a list of four or more.", "is": "points"})
     edge_radius: float = field(metadata=edge_metadata(_edge, "a hundredth of half the least width", "square edges"))
@@ -233,6 +236,21 @@ class Convex(Body):
                 break
             point = point - beyond * mean / max(float(mean @ mean), 1e-3)
         return np.asarray(point)
+
+    def face(self, point: Array) -> tuple[Array, Array]:
+        """See `Body`; only of edges that are sharp, the nearest."""
+        hull = self._hull
+        beyond = hull.normals @ point - hull.reaches
+        own = int(np.argmax(beyond))
+        cosines = hull.normals @ hull.normals[own]
+        sines = np.sqrt(1 - np.minimum(cosines**2, 1))
+        near = 2 * ALIKE * np.ptp(hull.corners, axis=0).max()
+        on = np.abs(hull.corners @ hull.normals.T - hull.reaches) <= near
+        sharp = np.flatnonzero(((on[:, [own]] & on).sum(axis=0) >= 2) & (cosines < _SHARP))
+        nearest = sharp[np.argsort(-beyond[sharp] / sines[sharp], kind="stable")[:_MOST_BOUNDS]]
+        # So far within the next face's plane its share in the mean normal turns that by no more.
+        off = -np.log(TILT) * self.edge_radius / _SHARPNESS
+        return hull.normals[nearest], hull.reaches[nearest] - off
 
     def support(self, direction: Array) -> Array:
         """See `Body`."""

@@ -10,11 +10,12 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from casadi_hands.geometry.bodies.body import Array, Body, Core, Solid, Surface, edge_metadata, farthest
+from casadi_hands.geometry.bodies.body import TILT, Array, Body, Core, Solid, Surface, edge_metadata, farthest
 from casadi_hands.geometry.smooth import norm
 
 _KINK = 1e-3  # rounding of corners, a share of the length along the axis and lengths across it
 _SPOKES = 12  # lines that stand for the side and the faces where a disc is near
+_FACE_SIDES = 8  # of the polygon within a face where contacts stay off its rim
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,7 @@ class Cylinder(Body):
 
     kind: ClassVar[str] = "cylinder"
     width: ClassVar[int] = 8
+    face_bounds: ClassVar[int] = _FACE_SIDES
     start: Array = field(metadata={"about": "Middle of one face, m, object frame.", "is": "point"})
     end: Array = field(metadata={"about": "Middle of the other face, m, object frame.", "is": "point"})
     radius: float = field(metadata={"about": "Radius, m.", "is": "positive"})
@@ -158,6 +160,18 @@ class Cylinder(Body):
         """See `Body`."""
         return np.asarray(point - self.signed_distance(point) * self.outward(point))
 
+    def face(self, point: Array) -> tuple[Array, Array]:
+        """See `Body`; beyond the rounded edge, what rounds the core's rim has to be far."""
+        above, beyond, _ = self._outside(point)
+        rounded = _KINK**2 / (4 * TILT * self.edge_radius)
+        if beyond >= above:
+            reach = self._length / 2 - self.edge_radius - rounded * self._length**2
+            ways = np.array([self.helper, -self.helper])
+        else:
+            reach = (self.radius - self.edge_radius - rounded) * np.cos(np.pi / _FACE_SIDES)
+            ways = self._across(_FACE_SIDES)
+        return ways, reach + ways @ self.centroid
+
     def support(self, direction: Array) -> Array:
         """See `Body`: of a rim that is level its middle."""
         inward, axis = self.edge_radius * self.helper, self.helper
@@ -189,15 +203,19 @@ class Cylinder(Body):
 
     def edges(self) -> list[tuple[Array, Array]]:
         """See `Body`: lines of the side, and across the faces."""
-        inward, axis = self.edge_radius * self.helper, self.helper
-        first = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-        first /= np.linalg.norm(first)
-        angles = np.linspace(0, 2 * np.pi, _SPOKES, endpoint=False)[:, None]
-        spokes = np.cos(angles) * first + np.sin(angles) * np.cross(axis, first)
-        rims = (self.radius - self.edge_radius) * spokes
+        inward = self.edge_radius * self.helper
+        rims = (self.radius - self.edge_radius) * self._across(_SPOKES)
         start, end = self.start + inward, self.end - inward
         across = [(face + rim, face - rim) for face in (start, end) for rim in rims[: _SPOKES // 2]]
         return [(start + rim, end + rim) for rim in rims] + across
+
+    def _across(self, count: int) -> Array:
+        """Directions (count, 3) across the axis, evenly all around it."""
+        axis = self.helper
+        first = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+        first /= np.linalg.norm(first)
+        angles = np.linspace(0, 2 * np.pi, count, endpoint=False)[:, None]
+        return np.asarray(np.cos(angles) * first + np.sin(angles) * np.cross(axis, first))
 
     def solids(self) -> tuple[Solid, ...]:
         """See `Body`."""

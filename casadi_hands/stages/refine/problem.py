@@ -8,6 +8,7 @@ from casadi_hands.problem.structure import Structure
 from casadi_hands.stages.own_terms import bind_own, contact_names
 from casadi_hands.stages.refine.coupling import bind as bind_coupling
 from casadi_hands.stages.refine.declaration import Block, Declaration
+from casadi_hands.stages.refine.faces import bind as bind_face
 from casadi_hands.stages.refine.finger_binding import bind_clearance, bind_contact, bind_pair, bind_rolling, bind_shape
 from casadi_hands.stages.refine.object_binding import bind_ground, bind_object, bind_physics
 from casadi_hands.stages.refine.restoration import Proximity
@@ -40,6 +41,7 @@ class RefineProblem(Declaration):
             bind_sliding(self)
         for i in range(len(structure.contacts)):
             bind_contact(self, i)
+            bind_face(self, i)
             bind_rolling(self, i)
             bind_clearance(self, i)
             bind_shape(self, i)

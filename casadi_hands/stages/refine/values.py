@@ -16,7 +16,7 @@ from casadi_hands.problem.model import Model
 from casadi_hands.problem.placement import contact_jacobians, contact_spins
 from casadi_hands.stages.object_motion.values import landing_bounds, most_turn, tool_path
 from casadi_hands.stages.own_terms import own_values
-from casadi_hands.stages.refine import attached
+from casadi_hands.stages.refine import attached, faces
 from casadi_hands.stages.refine.coupling import start as coupling_start
 from casadi_hands.stages.refine.declaration import HOLDING
 from casadi_hands.stages.refine.initial_guess import along_joint, balanced, disturbance_wrenches, rates_and_wrenches
@@ -223,8 +223,8 @@ class RefineValues:
 
     def parameters(self, motion: WholeHand, margin: Margin, wanted: WholeHand | None = None) -> dict[str, ArrayLike]:
         """Values of all parameters but the weights; costs hold a motion near to the wanted one, by default itself."""
-        model, wanted = self.model, wanted or motion
-        halves = self.structure.middles.weights()
+        model, structure, wanted = self.model, self.structure, wanted or motion
+        halves = structure.middles.weights()
         quaternion = halves @ continuous(motion.palm_quaternion)
         values: dict[str, ArrayLike] = {
             "reference": model.reference,
@@ -256,7 +256,7 @@ class RefineValues:
         if model.sliding:
             values |= {"sliding_friction": model.friction, "cone_friction": WHOLE * model.friction}
             values |= {"slide_margin": margin.friction, "slip_scale": SLIP_SCALE / model.units.length}
-        values |= own_values(self.problem, model)
+        values |= own_values(self.problem, model) | faces.parameters(model, structure.contacts)
         if model.disturbance is not None and len(self.disturbed):
             values["external_force"] = model.disturbance.force[self.disturbed]
             values["external_torque"] = model.disturbance.torque[self.disturbed]
@@ -264,12 +264,12 @@ class RefineValues:
             values["goals"] = model.goal_poses
         else:
             values["tool"], values["tool_path"] = model.tool, tool_path(model)
-        if self.structure.grounded and model.ground is not None:
+        if structure.grounded and model.ground is not None:
             values["ground_friction"] = margin.friction * model.frictions[-1]
-        for c in self.structure.columns:
+        for c in structure.columns:
             values[f"wanted_point{c}"], values[f"wanted_force{c}"] = wanted.point[:, c], wanted.force[:, c]
             values[f"body{c}"] = model.touched[c].parameters
-        for c, finger in zip(self.structure.contacts, wanted.fingers, strict=True):
+        for c, finger in zip(structure.contacts, wanted.fingers, strict=True):
             if finger.joints in MARGIN_SIZES:
                 values[f"margin_direction{c}"] = 0.0
             values[f"frames{c}"] = finger.frames.transpose(0, 2, 1).reshape(1, -1)

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from casadi_hands.errors import TaskError
 from casadi_hands.geometry.bodies import Body
+from casadi_hands.geometry.bodies.body import TILT
 from casadi_hands.geometry.bodies.capsule import Segment
 from casadi_hands.geometry.pairs import core_distance
 from casadi_hands.task import parse_task
@@ -173,6 +174,28 @@ def check_lowest(body: Body, rng: np.random.Generator) -> None:
         lowest, marks = (np.asarray(found).T for found in points(direction, body.parameters))
         np.testing.assert_allclose((lowest @ direction).min(), (body.support(-direction) @ direction)[0], atol=1e-3)
         assert (marks @ direction).min() <= (lowest @ direction).min() + 1e-9
+
+
+def check_faces(body: Body, sharp: Body, rng: np.random.Generator, least: float) -> None:
+    """Where half-spaces keep a contact on a face, the normal in symbols is that of the sharp body; and there is room.
+
+    Args:
+        body: with rounded edges.
+        sharp: the same with edges that are hardly round.
+        rng: which draws points.
+        least: share of points on the surface that are off the edges of their faces, at least.
+    """
+    function, within = surface_function(body), 0
+    points = rng.uniform(*body.bounding_box, (400, 3))
+    for point in map(sharp.on_surface, points):
+        ways, reach = body.face(point)
+        assert len(ways) == len(reach) <= body.face_bounds
+        np.testing.assert_allclose(np.linalg.norm(ways, axis=1), 1)
+        if np.all(ways @ point <= reach):
+            within += 1
+            normal = np.asarray(function(point, body.parameters)[1]).ravel()
+            assert np.linalg.norm(normal - sharp.outward(point)) < 2 * TILT
+    assert within >= least * len(points)
 
 
 def check_edges(body: Body, rng: np.random.Generator) -> None:

@@ -107,3 +107,19 @@ def test_a_task_file_gives_a_polytope() -> None:
     assert isinstance(shape.body, KINDS["convex"])
     assert shape.body.counts == (6, 8)
     assert shape.edge_radius == pytest.approx(0.0002)
+
+
+@pytest.mark.parametrize("body", [SAME, Convex(np.vstack([np.zeros(3), np.eye(3)]), 0.01)], ids=["box", "corner"])
+def test_off_sharp_edges_normals_are_those_of_the_faces(body: Convex, rng: np.random.Generator) -> None:
+    checks.check_faces(body, replace(body, edge_radius=1e-6), rng, 0.5)
+
+
+def test_a_face_has_the_bounds_of_its_sharp_edges_alone() -> None:
+    side, top = np.array([1.0, 0.1, 0.0]), np.array([0.1, 0.2, 1.0])
+    ways, reach = PRISM.face(side)
+    np.testing.assert_allclose(sorted(ways[:, 2]), [-1, 1])  # not those to the next sides, over which it may roll
+    np.testing.assert_allclose(reach, 1, atol=0.05)
+    ways, reach = PRISM.face(top)
+    assert len(ways) == PRISM.face_bounds
+    assert np.all(ways @ top <= reach)
+    assert not np.all(ways @ [0.2, 0.995, 1.0] <= reach)
