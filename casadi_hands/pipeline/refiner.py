@@ -190,7 +190,7 @@ class Refiner:
         best, latest = (judged, refined), refined
         if not refined.exact or not self.model.torsion or judged.replay_angle <= most:
             return best
-        for sharpness in range(1, stage.sharper + 1):
+        for sharpness in range(refined.sharpness + 1, stage.sharper + 1):
             if best[0].replay_angle <= most or not latest.exact:
                 break
             with self.record.stage("refine", f"again, slow spins resisted in full: {best[0].replay_words}"):
@@ -203,9 +203,14 @@ class Refiner:
     def _with_margin(
         self, whole: WholeHand, refined: Refined, stage: Continuation, margin: Margin, why: str
     ) -> Refined:
-        """An exact motion refined with another margin."""
+        """An exact motion refined with another margin, with slow spins resisted as they were."""
         with self.record.stage("refine", why):
-            return self._attempt(whole, margin, partial(stage.with_margin, refined))
+            other = self._attempt(whole, margin, partial(stage.with_margin, refined))
+            for sharpness in range(1, refined.sharpness + 1):
+                if other.exact:
+                    sharp = self._attempt(whole, margin, partial(stage.sharpened, other, sharpness))
+                    other = sharp if sharp.exact else other
+        return other
 
     def _refined(
         self,

@@ -132,7 +132,7 @@ class Continuation:
             margin: to keep to the limits.
         """
         sharp = self.fine.take(LAST_STEP, exact.hand, margin, sharpness=sharpness)
-        return replace(sharp, barely_rolls=exact.barely_rolls)
+        return replace(sharp, barely_rolls=exact.barely_rolls, sharpness=sharpness)
 
     def with_margin(self, exact: Refined, margin: Margin) -> Refined:
         """Refine a motion that is exact with another margin.

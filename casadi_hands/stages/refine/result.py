@@ -55,6 +55,7 @@ class Refined:
         margin: to keep to the limits, that the motion was solved with.
         homotopy: the parameter that the motion was continued to: 1 where it reaches its goals.
         tightest: the limit that keeps the worst of them from being met, as far as it can be told.
+        sharpness: how many times slower contacts that have their torsion at its limit may spin than at first.
     """
 
     hand: WholeHand
@@ -68,6 +69,7 @@ class Refined:
     margin: Margin
     homotopy: float = 1.0
     tightest: Tightest | None = None
+    sharpness: int = 0
 
     @property
     def exact(self) -> bool:
