@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from casadi_hands.task import Ground, Task
 
 _TIME_STEP = 0.001  # s
+_USUAL_FORCE = 2.0  # weights with which contacts press: where more, they are stiffer
 _SOFTNESS = 0.02  # depth over which a contact stiffens, of the characteristic length
 _STILL = 1e-9  # a palm that moves less, relative to its size (or in its quaternion), stands still
 
@@ -76,7 +77,7 @@ def scene_mjcf(task: Task, hand: Hand, motion: Motion) -> str:
     moves = _palm_moves(hand, motion)
     motors = joint_motors(task, hand)
     root = Element("mujoco", model=task.name)
-    _add_settings(root, task)
+    _add_settings(root, task, float(np.linalg.norm(motion.contact_force, axis=2).max(initial=0.0)))
     add_meshes(root, task)
     world = SubElement(root, "worldbody")
     SubElement(world, "light", pos=numbers(motion.object_position[0] + [0, 0, 20 * task.object.characteristic_length]))
@@ -118,8 +119,8 @@ def _palm_moves(hand: Hand, motion: Motion) -> bool:
     return bool(shift > _STILL or turn > _STILL)
 
 
-def _add_settings(root: Element, task: Task) -> None:
-    """Add solver options and the defaults of contacts."""
+def _add_settings(root: Element, task: Task, force: float) -> None:
+    """Add solver options and the defaults of contacts, the largest of whose planned forces is ``force`` (N)."""
     SubElement(root, "compiler", angle="radian")
     SubElement(
         root,
@@ -136,7 +137,8 @@ def _add_settings(root: Element, task: Task) -> None:
     SubElement(root, "statistic", extent=number(extent), center=numbers(center), meansize=number(extent / 20))
     # Where forces are larger than weights, contacts are as much stiffer: they give as the square of this time, in s.
     weight = task.object.mass * (float(np.linalg.norm(task.gravity)) or 9.81)
-    give = max(0.01 * float(np.sqrt(min(weight / task.force_unit, 1.0))), 2 * _TIME_STEP)
+    share = weight / max(task.force_unit, force / _USUAL_FORCE)
+    give = max(0.01 * float(np.sqrt(min(share, 1.0))), 2 * _TIME_STEP)
     geom = {
         "condim": "4",
         "solref": f"{number(give)} 1",

@@ -21,6 +21,7 @@ from casadi_hands.problem.palm_motion import goals_seen_from_palm
 from casadi_hands.problem.resampling import shortened
 from casadi_hands.problem.structure import mobility
 from casadi_hands.stages.refine.result import Refined
+from casadi_hands.stages.refine.values import Margin
 from casadi_hands.stages.synthesis.algorithm import Candidate, Found, Search
 
 Array = NDArray[np.float64]
@@ -90,13 +91,18 @@ class Certifier:
             found = run_search(self.record, self.model, self.search, least)
 
     def certify(
-        self, candidate: Candidate, short: tuple[Reason, ...] = (), grips: bool = True
+        self,
+        candidate: Candidate,
+        short: tuple[Reason, ...] = (),
+        margin: Margin | None = None,
+        grips: bool = True,
     ) -> tuple[Design, Refined]:
         """Find a hand's motion and refine it; where contacts cannot go with the object, from a shorter one on.
 
         Args:
             candidate: the hand.
             short: what its fingers could not do before.
+            margin: the first to be tried; by default what suits the hand.
             grips: whether other grips are tried where replays fail.
 
         Returns:
@@ -104,7 +110,7 @@ class Certifier:
         """
         model, floating, homotopy = self._begun
         whole = run_whole_hand(self.record, model, floating, candidate)
-        return self.refiner.certify(whole, short, homotopy=homotopy, grips=grips)
+        return self.refiner.certify(whole, short, margin, homotopy=homotopy, grips=grips)
 
     @cached_property
     def _begun(self) -> tuple[Model, Floating, float]:

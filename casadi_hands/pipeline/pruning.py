@@ -51,8 +51,11 @@ class Pruner:
         Returns:
             The design itself where it is not certified, or where none with fewer joints is.
         """
-        if design.status != "certified":
+        if design.status != "certified" or design.hand is None:
             return design
+        # Another hand of the same structure, or of more joints, may have failed before: that says nothing now.
+        own = [len(finger.links) for finger in design.hand.fingers]
+        self.failed = {joints for joints in self.failed if any(n < m for n, m in zip(joints, own, strict=True))}
         while (fewer := self._fewer(design)) is not None:
             design = fewer
         return design
@@ -61,7 +64,7 @@ class Pruner:
         """A certified design with fewer joints, or None."""
         choices = fewer_joints(design)
         for joints in [*choices, *(spare_joints(design) if self.spare else ())]:
-            # An idle joint is none that others need, whatever came of hands without more than it.
+            # Idle joints are left out even where hands with more have failed.
             if joints in self.failed or (joints not in choices and self._fails(joints)):
                 continue
             words = "+".join(map(str, joints))

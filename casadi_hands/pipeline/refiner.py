@@ -155,7 +155,7 @@ class Refiner:
             text = f"again with samples in the middle of {crowded.sum()} of {len(crowded)} intervals: {judged.reason}"
             with self.record.stage("refine", text):
                 halved = Continuation(finer, stage.contacts, stage.joints, hand.active)
-                closer = self._attempt(whole, refined.margin, partial(halved.renew, hand))
+                closer = self._attempt(whole, refined.margin, partial(halved.renew, hand, refined.sharpness))
             design = self._judged(finer, closer, short, planned)
             if excess(design) > GAIN * excess(judged) and len(design.missed) >= len(judged.missed):
                 break
@@ -207,9 +207,12 @@ class Refiner:
         with self.record.stage("refine", why):
             other = self._attempt(whole, margin, partial(stage.with_margin, refined))
             for sharpness in range(1, refined.sharpness + 1):
-                if other.exact:
-                    sharp = self._attempt(whole, margin, partial(stage.sharpened, other, sharpness))
-                    other = sharp if sharp.exact else other
+                sharp = (
+                    self._attempt(whole, margin, partial(stage.sharpened, other, sharpness)) if other.exact else other
+                )
+                if not sharp.exact:
+                    break
+                other = sharp
         return other
 
     def _refined(

@@ -268,7 +268,7 @@ def _certified(certifier: Certifier, found: Found) -> Design:
     spare = certifier.record.task.motors == "independent" and not rolls_far(certifier.model)
 
     def certify(candidate: Candidate) -> Design:
-        return certifier.certify(candidate, grips=False)[0]
+        return certifier.certify(candidate, margin=kept_margin(design), grips=False)[0]
 
     return Pruner(certifier.record, certifier.search, certify, spare, certifier.failed).run(design)
 

@@ -89,8 +89,8 @@ _QUANTITIES = {
     "patches": Quantity("where contacts are wanted; object frame", "length"),
     "tie": Quantity("how strongly the contact is held to where it is wanted", ""),
     "helper": Quantity("directions across the surface, from which tangents are made; object frame", ""),
-    "face_ways": Quantity("outward normals of half-spaces that keep a contact off edges; object frame", ""),
-    "face_reach": Quantity("of these half-spaces, along their normals", "length"),
+    "face_normals": Quantity("outward normals of half-spaces that keep a contact off edges; object frame", ""),
+    "face_offsets": Quantity("of these half-spaces, along their normals", "length"),
     "margin_direction": Quantity("signs of the singularity margin to be kept: which way the finger bends", ""),
     # Goals.
     "targets": Quantity("goals' positions, world", "length"),

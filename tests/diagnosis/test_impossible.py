@@ -11,7 +11,8 @@ from casadi_hands.diagnosis.impossible import LEAST_INERTIA, findings, impossibi
 from casadi_hands.problem.si import build_model
 from casadi_hands.task import load_task, parse_task
 
-PROBLEMS = sorted((Path(__file__).parents[2] / "problems").glob("*.yaml"))
+ROOT = Path(__file__).parents[2]
+PROBLEMS = sorted(path for folder in ("problems", "examples/everyday") for path in (ROOT / folder).glob("*.yaml"))
 WEIGHT = 0.1 * 9.81
 
 

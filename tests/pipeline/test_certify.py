@@ -219,12 +219,14 @@ def test_what_is_missed_only_between_samples_gets_more_of_them(
         def __init__(self, model: Any, *_: Any) -> None:
             self.model = model
 
-        def renew(self, start: Any, margin: Margin) -> Any:
+        def renew(self, start: Any, sharpness: int, margin: Margin) -> Any:
+            assert sharpness == 0
             tried.append(self.model.schedule.samples)
-            return SimpleNamespace(exact=True, barely_rolls=False, hand=start, runs=(), weights={}, margin=margin)
+            told = {"runs": (), "weights": {}, "margin": margin, "sharpness": 0}
+            return SimpleNamespace(exact=True, barely_rolls=False, hand=start, **told)
 
         def solve(self, start: Any, margin: Margin, near: bool) -> Any:
-            return self.renew(start, margin)
+            return self.renew(start, 0, margin)
 
         def passes_through(self, refined: Any) -> bool:
             return passes
@@ -264,7 +266,8 @@ class Ways:
 
     contacts, joints, active, model = (0, 1), (1, 1), None, None
     exact = True  # with what links bear as a limit, too
-    sharper = 1
+    sharper: int = 1
+    blunt: tuple[Margin, ...] = ()  # margins with which no sharpened motion is exact
 
     def __init__(self, firm: bool) -> None:
         self.firm, self.passes = firm, False
@@ -294,7 +297,7 @@ class Ways:
 
     def sharpened(self, exact: Any, sharpness: int, margin: Margin) -> Any:
         sharp = self.taken("sharpened" if sharpness == 1 else f"sharpened to {sharpness}", margin)
-        sharp.sharpness = sharpness
+        sharp.sharpness, sharp.exact = sharpness, margin not in self.blunt
         return sharp
 
     def with_margin(self, exact: Any, margin: Margin) -> Any:
@@ -556,6 +559,21 @@ def test_slower_and_slower_spins_are_resisted_until_the_replay_keeps_its_goals(
     sharper = [("sharpened", AMPLE), ("sharpened to 2", AMPLE)][: len(angles) - 1]
     again = [("with_margin", LARGE), *((name, LARGE) for name, _ in sharper)]
     assert ways.asked == [("solve", AMPLE), *sharper, *(again if more else [])]
+
+
+def test_spins_are_resisted_as_far_as_motions_are_exact(monkeypatch: pytest.MonkeyPatch) -> None:
+    ways, off = Ways(firm=False), list[float]()
+    ways.sharper, ways.blunt = 2, (AMPLE,)
+    statuses = ["certified", "feasible", "certified"]
+    refine(monkeypatch, ways, 1.0, statuses, [0, 0], angles=[9.0, 2.0], soft=True, off=off)
+    assert off == [2.0]
+    assert ways.asked == [("solve", AMPLE), ("sharpened", AMPLE), ("with_margin", LARGE)]
+    # With another grip as they were, if that is exact.
+    ways, off = Ways(firm=False), []
+    ways.blunt = (LARGE,)
+    refine(monkeypatch, ways, 1.0, ["certified"] * 3, [0] * 3, angles=[9.0, 4.0, 2.0], soft=True, off=off)
+    assert off == [2.0]
+    assert ways.asked == [("solve", AMPLE), ("sharpened", AMPLE), ("with_margin", LARGE), ("sharpened", LARGE)]
 
 
 @pytest.mark.parametrize(("angle", "kept"), [(2.0, 2.0), (8.0, 8.0), (10.0, 9.0)])

@@ -170,3 +170,10 @@ def test_an_idle_joint_goes_whatever_came_of_hands_with_more() -> None:
     assert found is fewer
     assert asked(search) == [(2, 1)]
     assert pruned(start, {(2, 1): fewer}, failed=[(2, 1)])[0] is start
+
+
+def test_another_hand_that_failed_with_as_many_joints_says_nothing() -> None:
+    start, fewer = of(3, 3), of(2, 2)
+    found, search = pruned(start, {(2, 2): fewer}, spare=True, failed=[(3, 3)])
+    assert found is fewer
+    assert asked(search) == [(2, 2)]

@@ -197,9 +197,10 @@ class Body(ABC):
         return ""
 
     def face(self, point: Array) -> tuple[Array, Array]:
-        """Where a contact that is on a point's face stays off its edges: in (M, 3)·p <= (M,), M at most face_bounds.
+        """Where a contact that is on a point's face stays off its edges: outward normals (M, 3) and offsets (M,).
 
-        On rounded edges surfaces have other normals than on those of the files, which are sharp.
+        There normal · p is at most the offset; in the body's units and its object's frame; M is at most `face_bounds`.
+        On rounded edges the surface has other normals than that of the files, which is sharp.
 
         Args:
             point: (3,) on the surface.

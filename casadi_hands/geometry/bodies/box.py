@@ -166,9 +166,9 @@ class Box(Body):
         """See `Body`; beyond the rounded edge, what rounds the core's corners has to be far."""
         _, beyond = self._local(point)
         sides = np.delete(np.arange(3), np.argmax(beyond)).repeat(2)
-        ways = np.tile([1.0, -1.0], 2)[:, None] * self.turn.T[sides]
-        rounded = (_KINK * self._half) ** 2 / (2 * TILT * self.edge_radius)
-        return ways, (self._half - self.edge_radius - rounded)[sides] + ways @ self.center
+        normals = np.tile([1.0, -1.0], 2)[:, None] * self.turn.T[sides]
+        rounded = (_KINK * self._half) ** 2 / (4 * TILT * self.edge_radius)
+        return normals, (self._half - self.edge_radius - rounded)[sides] + normals @ self.center
 
     def support(self, direction: Array) -> Array:
         """See `Body`."""

@@ -24,7 +24,7 @@ _SHARPNESS = float(np.sqrt(2) * np.log(2) / (np.sqrt(2) - 1))
 _LOWEST = 1e-3  # lengths by which corners may be higher than the lowest and count for it
 _STEPS = 1000  # towards the surface; in a sharp wedge they zigzag
 _MOST_BOUNDS = 8  # of a face, those nearest to a point
-_SHARP = np.cos(np.radians(30))  # of the angle between faces: contacts may roll over blunter edges
+_SHARP = np.cos(np.radians(30.01))  # of the angle between faces: contacts may roll over blunter edges
 _ROUNDS = 30  # of moving faces until the surface goes through their middles
 
 

@@ -166,11 +166,11 @@ class Cylinder(Body):
         rounded = _KINK**2 / (4 * TILT * self.edge_radius)
         if beyond >= above:
             reach = self._length / 2 - self.edge_radius - rounded * self._length**2
-            ways = np.array([self.helper, -self.helper])
+            normals = np.array([self.helper, -self.helper])
         else:
             reach = (self.radius - self.edge_radius - rounded) * np.cos(np.pi / _FACE_SIDES)
-            ways = self._across(_FACE_SIDES)
-        return ways, reach + ways @ self.centroid
+            normals = self._across(_FACE_SIDES)
+        return normals, reach + normals @ self.centroid
 
     def support(self, direction: Array) -> Array:
         """See `Body`: of a rim that is level its middle."""

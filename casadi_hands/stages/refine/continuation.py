@@ -109,14 +109,17 @@ class Continuation:
             for steps in sequences
         )
 
-    def renew(self, start: WholeHand, margin: Margin) -> Refined:
+    def renew(self, start: WholeHand, sharpness: int, margin: Margin) -> Refined:
         """Refine a motion that was exact at other samples.
 
         Args:
             start: the motion, at the task's samples.
+            sharpness: how many times it was sharpened.
             margin: to keep to the limits.
         """
-        return _until_met(partial(self.fine.take, steps, start, margin) for steps in (RENEWED_STEPS, LAST_STEP))
+        steps = (RENEWED_STEPS, LAST_STEP)
+        renewed = _until_met(partial(self.fine.take, each, start, margin, sharpness=sharpness) for each in steps)
+        return replace(renewed, sharpness=sharpness)
 
     @property
     def sharper(self) -> int:

@@ -153,8 +153,8 @@ class Declaration:
         for c, n in zip(structure.contacts, structure.joints, strict=True):
             self._own("helper", c, (count, 3))
             if bounds := structure.model.touched[c].face_bounds:
-                self._own("face_ways", c, (count, 3 * bounds))
-                self._own("face_reach", c, (count, bounds))
+                self._own("face_normals", c, (count, 3 * bounds))
+                self._own("face_offsets", c, (count, bounds))
             self._own("tie", c, (1, 1))
             if n in MARGIN_SIZES:
                 self._own("margin_direction", c, (count, MARGIN_SIZES[n]))

@@ -23,6 +23,7 @@ from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.placement import contact_slips
 from casadi_hands.stages.refine.declaration import FREE, Declaration
+from casadi_hands.stages.refine.touching import runs
 from casadi_hands.terms import constraints as limits
 from casadi_hands.terms import contact as contact_terms
 
@@ -103,12 +104,6 @@ def bind(of: Declaration) -> None:
                 step=of.steps(*each),
                 **problem.given("slip_scale"),
             )
-
-
-def runs(flags: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
-    """The intervals of each stretch with set flags (K,)."""
-    found = np.flatnonzero(flags)
-    return [run for run in np.split(found, np.flatnonzero(np.diff(found) > 1) + 1) if len(run)]
 
 
 def start(model: Model, motion: WholeHand, helpers: Array, active: NDArray[np.bool_]) -> dict[str, Array]:

@@ -33,3 +33,9 @@ def longest_run(flags: NDArray[np.bool_], lengths: Array) -> float:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
     passed = np.append(0.0, np.cumsum(lengths))
     return float((passed[edges[1::2]] - passed[edges[::2]]).max(initial=0.0))
+
+
+def runs(flags: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
+    """The indices of each stretch with set flags (K,)."""
+    found = np.flatnonzero(flags)
+    return [run for run in np.split(found, np.flatnonzero(np.diff(found) > 1) + 1) if len(run)]

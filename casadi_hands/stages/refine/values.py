@@ -22,9 +22,9 @@ from casadi_hands.stages.refine.declaration import HOLDING
 from casadi_hands.stages.refine.initial_guess import along_joint, balanced, disturbance_wrenches, rates_and_wrenches
 from casadi_hands.stages.refine.problem import RefineProblem
 from casadi_hands.stages.refine.settings import SHARP
-from casadi_hands.stages.refine.sliding import SLIP_SCALE, WHOLE, runs
+from casadi_hands.stages.refine.sliding import SLIP_SCALE, WHOLE
 from casadi_hands.stages.refine.sliding import start as sliding_start
-from casadi_hands.stages.refine.touching import force_ramp, longest_run, resting
+from casadi_hands.stages.refine.touching import force_ramp, longest_run, resting, runs
 
 Array = NDArray[np.float64]
 TOOL_TOLERANCE = 5e-3  # lengths, how far a drawing's tool may leave its path between goals
@@ -256,7 +256,7 @@ class RefineValues:
         if model.sliding:
             values |= {"sliding_friction": model.friction, "cone_friction": WHOLE * model.friction}
             values |= {"slide_margin": margin.friction, "slip_scale": SLIP_SCALE / model.units.length}
-        values |= own_values(self.problem, model) | faces.parameters(model, structure.contacts)
+        values |= own_values(self.problem, model) | faces.parameters(structure, motion)
         if model.disturbance is not None and len(self.disturbed):
             values["external_force"] = model.disturbance.force[self.disturbed]
             values["external_torque"] = model.disturbance.torque[self.disturbed]

@@ -188,10 +188,10 @@ def check_faces(body: Body, sharp: Body, rng: np.random.Generator, least: float)
     function, within = surface_function(body), 0
     points = rng.uniform(*body.bounding_box, (400, 3))
     for point in map(sharp.on_surface, points):
-        ways, reach = body.face(point)
-        assert len(ways) == len(reach) <= body.face_bounds
-        np.testing.assert_allclose(np.linalg.norm(ways, axis=1), 1)
-        if np.all(ways @ point <= reach):
+        normals, offsets = body.face(point)
+        assert len(normals) == len(offsets) <= body.face_bounds
+        np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1)
+        if np.all(normals @ point <= offsets):
             within += 1
             normal = np.asarray(function(point, body.parameters)[1]).ravel()
             assert np.linalg.norm(normal - sharp.outward(point)) < 2 * TILT

@@ -101,6 +101,6 @@ def test_a_task_file_gives_a_box() -> None:
 
 def test_off_the_edges_of_a_face_normals_are_those_of_the_sharp_box(rng: np.random.Generator) -> None:
     checks.check_faces(CRATE, replace(CRATE, edge_radius=1e-6), rng, 0.5)
-    ways, reach = CRATE.face(CRATE.center + 0.4 * CRATE.turn[:, 0])
-    np.testing.assert_allclose(ways, CRATE.turn.T[[1, 1, 2, 2]] * [[1], [-1], [1], [-1]], atol=1e-12)
-    np.testing.assert_allclose(reach - ways @ CRATE.center, [0.65, 0.65, 0.95, 0.95], atol=0.02)
+    normals, offsets = CRATE.face(CRATE.center + 0.4 * CRATE.turn[:, 0])
+    np.testing.assert_allclose(normals, CRATE.turn.T[[1, 1, 2, 2]] * [[1], [-1], [1], [-1]], atol=1e-12)
+    np.testing.assert_allclose(offsets - normals @ CRATE.center, [0.65, 0.65, 0.95, 0.95], atol=0.02)

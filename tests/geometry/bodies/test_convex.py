@@ -116,10 +116,10 @@ def test_off_sharp_edges_normals_are_those_of_the_faces(body: Convex, rng: np.ra
 
 def test_a_face_has_the_bounds_of_its_sharp_edges_alone() -> None:
     side, top = np.array([1.0, 0.1, 0.0]), np.array([0.1, 0.2, 1.0])
-    ways, reach = PRISM.face(side)
-    np.testing.assert_allclose(sorted(ways[:, 2]), [-1, 1])  # not those to the next sides, over which it may roll
-    np.testing.assert_allclose(reach, 1, atol=0.05)
-    ways, reach = PRISM.face(top)
-    assert len(ways) == PRISM.face_bounds
-    assert np.all(ways @ top <= reach)
-    assert not np.all(ways @ [0.2, 0.995, 1.0] <= reach)
+    normals, offsets = PRISM.face(side)
+    np.testing.assert_allclose(sorted(normals[:, 2]), [-1, 1])  # not those to the next sides, over which it may roll
+    np.testing.assert_allclose(offsets, 1, atol=0.05)
+    normals, offsets = PRISM.face(top)
+    assert len(normals) == PRISM.face_bounds
+    assert np.all(normals @ top <= offsets)
+    assert not np.all(normals @ [0.2, 0.995, 1.0] <= offsets)

@@ -117,5 +117,5 @@ def test_a_task_file_gives_a_can() -> None:
 def test_off_the_rims_of_side_and_faces_normals_are_those_of_the_sharp_cylinder(rng: np.random.Generator) -> None:
     checks.check_faces(CAN, replace(CAN, edge_radius=1e-6), rng, 0.5)
     axis = (CAN.end - CAN.start) / np.linalg.norm(CAN.end - CAN.start)
-    ways, _ = CAN.face(CAN.on_surface(CAN.centroid + 0.6 * np.cross(axis, [1, 0, 0])))
-    np.testing.assert_allclose(ways, [axis, -axis], atol=1e-12)
+    normals, _ = CAN.face(CAN.on_surface(CAN.centroid + 0.6 * np.cross(axis, [1, 0, 0])))
+    np.testing.assert_allclose(normals, [axis, -axis], atol=1e-12)

@@ -54,6 +54,7 @@ class Told(Continuation):
         self.taken: list[tuple[str, str, float, float]] = []
         self.wanted: list[WholeHand] = []
         self.cleared: list[bool] = []
+        self.sharpened_to: list[int] = []
         self.exact_where, self.hopeless, self.violation, self.firmer_on = exact, hopeless, violation, firmer_on
         self.sparse, self.coarse, self.fine = (self._stage(level) for level in LEVELS)  # type: ignore[misc]
 
@@ -67,7 +68,9 @@ class Told(Continuation):
             homotopy: float = 1.0,
             wanted: WholeHand | None = None,
             clear: bool = False,
+            sharpness: int = 0,
         ) -> Refined:
+            self.sharpened_to.append(sharpness)
             self.cleared.append(clear)
             wanted = wanted or hand
             assert len(hand.position) == len(wanted.position) == len(model.schedule.samples)
@@ -353,7 +356,9 @@ def test_a_motion_that_is_exact_but_for_its_samples_takes_the_last_step_alone(
 ) -> None:
     left = iter(answers)
     told = Told(lambda level, homotopy, margin: next(left))
-    assert told.renew(start, Margin()).exact == exact
+    renewed = told.renew(start, 2, Margin())
+    assert (renewed.exact, renewed.sharpness) == (exact, 2)
+    assert told.sharpened_to == len(answers) * [2]
     # Where a small barrier leads nowhere a larger one is tried.
     assert told.ways == len(answers) * [("fine", "hard constraints")]
 

@@ -17,7 +17,8 @@ from casadi_hands.stages.refine import finger_kernels, sliding
 from casadi_hands.stages.refine.declaration import Declaration
 from casadi_hands.stages.refine.problem import RefineProblem
 from casadi_hands.stages.refine.settings import ALL_STEPS, LAST_STEP, SHARPER, VISCOUS, graded
-from casadi_hands.stages.refine.sliding import SLIP_SCALE, WHOLE, runs
+from casadi_hands.stages.refine.sliding import SLIP_SCALE, WHOLE
+from casadi_hands.stages.refine.touching import runs
 from casadi_hands.stages.refine.values import Margin
 from casadi_hands.task import parse_task
 from tests.stages.blocks import STEP, check_block, numbers
