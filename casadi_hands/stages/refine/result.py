@@ -55,7 +55,7 @@ class Refined:
         margin: to keep to the limits, that the motion was solved with.
         homotopy: the parameter that the motion was continued to: 1 where it reaches its goals.
         tightest: the limit that keeps the worst of them from being met, as far as it can be told.
-        sharpness: how many times slower contacts that have their torsion at its limit may spin than at first.
+        sharpness: how many times the spin was lowered beyond which contacts have their torsion at its limit.
     """
 
     hand: WholeHand

@@ -112,7 +112,7 @@ class RefineStage:
             margin: to keep to the limits.
             homotopy: the parameter: 0 where the object stays at its first goal, 1 where it reaches all of them.
             wanted: the motion, of the same hand, that costs hold near to; by default that to begin with.
-            sharpness: how many times slower contacts that have their torsion at its limit may spin than at first.
+            sharpness: how many times the spin was lowered beyond which contacts have their torsion at its limit.
         """
         given = self.given if homotopy == 1 else RefineValues(self.built, shortened(self.model, homotopy))
         values, parameters = given.start(start, sharpness), given.parameters(start, margin, wanted)

@@ -159,7 +159,7 @@ class RefineValues:
 
         Args:
             motion: to begin with.
-            sharpness: how many times slower contacts that count as spinning may spin than at first.
+            sharpness: how many times the spin was lowered beyond which contacts count as spinning.
         """
         count, chosen = self.knots, self.structure.columns
         joint, freedom = self.model.attachment, None
