@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from apart import ended, read_apart, solve_apart
 
 from casadi_hands.export.design import Design
+from casadi_hands.pipeline.placing import placed_like, stood_like
 from casadi_hands.task import Task, load_task, task_to_yaml
 from casadi_hands.verify import replay, replay_many
 
@@ -70,9 +71,14 @@ def is_kept(task: Task, folder: Path, limit: float | None) -> bool:
 
 
 def is_of(task: Task, folder: Path) -> bool:
-    """Whether a folder is of this very task, seed included."""
+    """Whether a folder is of this very task, seed included, with what the program placed of it."""
     file = folder / "task.yaml"
-    return file.is_file() and file.read_text(encoding="utf-8") == task_to_yaml(task)
+    if not file.is_file():
+        return False
+    if not task.is_placed or task.palm.placed:
+        earlier = load_task(file)
+        task = placed_like(stood_like(task, earlier), earlier)
+    return file.read_text(encoding="utf-8") == task_to_yaml(task)
 
 
 def with_seed(task: Task, seed: int) -> Task:

@@ -13,10 +13,11 @@ from apart import ENDED
 from entries import Entry, entry_of, figures_of
 from gallery import HEAD, main, row, write_all
 from PIL import Image
-from shared import result_folder, table_text, with_seed
+from shared import is_of, result_folder, table_text, with_seed
 from stills import MOMENTS, SIZE
 
 from casadi_hands import load_task
+from casadi_hands.task import FingerSpec
 from tests.export.browser import needs_browser
 from tests.export.example import TASK, example_design
 
@@ -173,6 +174,23 @@ def test_result_of_another_seed_or_task_is_not_taken(tmp_path: Path) -> None:
     assert entry_of(file, 0, tmp_path / "out", 1).folder == tmp_path / "out" / "good"
     file.write_text(file.read_text().replace("mass: 0.1", "mass: 0.11"))
     assert entry_of(file, 0, tmp_path / "out", 1).state == "not solved"
+
+
+def test_a_result_with_contacts_that_were_placed_is_of_the_task_that_asked_for_them(tmp_path: Path) -> None:
+    file = problem(tmp_path / "problems", "good")
+    given = "{touches: [0, 0.02, -0.01]}"
+    asked = file.read_text().replace(given, "{touches: anywhere}")
+    file.write_text(asked)
+    task = load_task(file)
+    placed = FingerSpec(touches=(0.0, 0.02, -0.01), placed=task.fingers["thumb"].touches)
+    done = task.model_copy(update={"fingers": {**task.fingers, "thumb": placed}})
+    folder = result_folder(file, 0, "refine", tmp_path / "out")
+    replace(example_design(), task=done, status="feasible", certificate=CERTIFICATE).save(folder)
+    assert is_of(load_task(file), folder)
+    file.write_text(asked.replace("mass: 0.1", "mass: 0.11"))
+    assert not is_of(load_task(file), folder)
+    file.write_text(asked.replace("{touches: anywhere}", "{touches: {near: [0, 0.02, 0], within: 0.03}}"))
+    assert not is_of(load_task(file), folder)
 
 
 def test_solved_tasks_are_not_solved_again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
