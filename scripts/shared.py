@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 from apart import ended, read_apart, solve_apart
 
+from casadi_hands.errors import TaskError
 from casadi_hands.export.design import Design
 from casadi_hands.pipeline.placing import placed_like, stood_like
-from casadi_hands.task import Task, load_task, task_to_yaml
+from casadi_hands.task import Task, load_task, parse_task, task_to_yaml
 from casadi_hands.verify import replay, replay_many
 
 if TYPE_CHECKING:
@@ -75,10 +76,14 @@ def is_of(task: Task, folder: Path) -> bool:
     file = folder / "task.yaml"
     if not file.is_file():
         return False
-    if not task.is_placed or task.palm.placed:
-        earlier = load_task(file)
-        task = placed_like(stood_like(task, earlier), earlier)
-    return file.read_text(encoding="utf-8") == task_to_yaml(task)
+    text = file.read_text(encoding="utf-8")
+    if text == task_to_yaml(task):
+        return True
+    try:
+        earlier = parse_task(text)
+    except TaskError:
+        return False
+    return text == task_to_yaml(placed_like(stood_like(task, earlier), earlier))
 
 
 def with_seed(task: Task, seed: int) -> Task:

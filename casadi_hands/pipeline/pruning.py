@@ -17,7 +17,7 @@ from casadi_hands.stages.synthesis.algorithm import Candidate, Search
 
 HOPELESS = 0.5  # score of a finger that leaves half of the object's weight to its structure
 IDLE = np.radians(5)  # that a joint moves in a motion, below which a bend may do instead
-ENOUGH = 2  # joints of a finger, which all hands need that hold and move an object against its weight, or nearly all
+FEWEST = 2  # joints of a finger that bears its share of a weight and moves it, but for lucky ones
 
 
 class Pruner:
@@ -51,10 +51,10 @@ class Pruner:
         Returns:
             The design itself where it is not certified, or where none with fewer joints is.
         """
-        if design.status != "certified" or design.hand is None:
+        if design.status != "certified":
             return design
         # Another hand of the same structure, or of more joints, may have failed before: that says nothing now.
-        own = [len(finger.links) for finger in design.hand.fingers]
+        own, _ = _moved(design)
         self.failed = {joints for joints in self.failed if any(n < m for n, m in zip(joints, own, strict=True))}
         while (fewer := self._fewer(design)) is not None:
             design = fewer
@@ -99,7 +99,7 @@ def fewer_joints(design: Design) -> list[tuple[int, ...]]:
     """
     joints, moved = _moved(design)
     least = {i: each for i, each in moved.items() if joints[i] > 1 and each < IDLE}
-    choices = [set(least), {i for i in least if joints[i] > ENOUGH}, set(sorted(least, key=least.__getitem__)[:1])]
+    choices = [set(least), {i for i in least if joints[i] > FEWEST}, set(sorted(least, key=least.__getitem__)[:1])]
     return _without(joints, choices)
 
 
@@ -112,7 +112,7 @@ def spare_joints(design: Design) -> list[tuple[int, ...]]:
         design: with a hand and a motion.
     """
     joints, moved = _moved(design)
-    spare = sorted((i for i in moved if joints[i] > ENOUGH), key=moved.__getitem__)
+    spare = sorted((i for i in moved if joints[i] > FEWEST), key=moved.__getitem__)
     return _without(joints, [set(spare), *({i} for i in spare)])
 
 

@@ -190,7 +190,7 @@ class Refiner:
         best, latest = (judged, refined), refined
         if not refined.exact or not self.model.torsion or judged.replay_angle <= most:
             return best
-        for sharpness in range(refined.sharpness + 1, stage.sharper + 1):
+        for sharpness in range(refined.sharpness + 1, stage.sharpest + 1):
             if best[0].replay_angle <= most or not latest.exact:
                 break
             with self.record.stage("refine", f"again, slow spins resisted in full: {best[0].replay_words}"):
@@ -207,9 +207,9 @@ class Refiner:
         with self.record.stage("refine", why):
             other = self._attempt(whole, margin, partial(stage.with_margin, refined))
             for sharpness in range(1, refined.sharpness + 1):
-                sharp = (
-                    self._attempt(whole, margin, partial(stage.sharpened, other, sharpness)) if other.exact else other
-                )
+                if not other.exact:
+                    break
+                sharp = self._attempt(whole, margin, partial(stage.sharpened, other, sharpness))
                 if not sharp.exact:
                     break
                 other = sharp

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from contextlib import nullcontext
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 from casadi_hands.diagnosis.impossible import findings
@@ -266,9 +267,10 @@ def _certified(certifier: Certifier, found: Found) -> Design:
     """
     design = certifier.run(found)
     spare = certifier.record.task.motors == "independent" and not rolls_far(certifier.model)
+    margin = cache(lambda: kept_margin(design))  # only where another hand is tried
 
     def certify(candidate: Candidate) -> Design:
-        return certifier.certify(candidate, margin=kept_margin(design), grips=False)[0]
+        return certifier.certify(candidate, margin=margin(), grips=False)[0]
 
     return Pruner(certifier.record, certifier.search, certify, spare, certifier.failed).run(design)
 

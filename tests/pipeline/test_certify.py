@@ -266,7 +266,7 @@ class Ways:
 
     contacts, joints, active, model = (0, 1), (1, 1), None, None
     exact = True  # with what links bear as a limit, too
-    sharper: int = 1
+    sharpest: int = 1
     blunt: tuple[Margin, ...] = ()  # margins with which no sharpened motion is exact
 
     def __init__(self, firm: bool) -> None:
@@ -550,7 +550,7 @@ def test_slower_and_slower_spins_are_resisted_until_the_replay_keeps_its_goals(
     monkeypatch: pytest.MonkeyPatch, angles: list[float], kept: float
 ) -> None:
     ways, off = Ways(firm=False), list[float]()
-    ways.sharper = 2
+    ways.sharpest = 2
     # A firmer grip, with spins resisted likewise, is no better.
     more = [4.5] if kept > 3 else []
     count = len(angles) + len(more)
@@ -563,7 +563,7 @@ def test_slower_and_slower_spins_are_resisted_until_the_replay_keeps_its_goals(
 
 def test_spins_are_resisted_as_far_as_motions_are_exact(monkeypatch: pytest.MonkeyPatch) -> None:
     ways, off = Ways(firm=False), list[float]()
-    ways.sharper, ways.blunt = 2, (AMPLE,)
+    ways.sharpest, ways.blunt = 2, (AMPLE,)
     statuses = ["certified", "feasible", "certified"]
     refine(monkeypatch, ways, 1.0, statuses, [0, 0], angles=[9.0, 2.0], soft=True, off=off)
     assert off == [2.0]

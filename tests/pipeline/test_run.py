@@ -263,3 +263,38 @@ def test_straight_links_are_tried_first_where_fingers_must_roll_far(
     design = run._run(Record(task, None, lambda _: None), "refine", None, 1)
     assert tried == bends
     assert design.status == ("certified" if len(bends) == 2 else straight)
+
+
+@pytest.mark.parametrize(
+    ("motors", "far", "spare"), [("independent", False, True), ("independent", True, False), ("fewest", False, False)]
+)
+def test_joints_are_spared_where_each_has_a_motor_and_none_must_roll_far(
+    motors: str, far: bool, spare: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    task = ball_task().model_copy(update={"motors": motors})
+    found, asked, told = Design(task, "certified"), list[tuple[Any, ...]](), list[Any]()
+
+    def certify(candidate: Any, margin: Any, grips: bool) -> tuple[str, None]:
+        asked.append((candidate, margin, grips))
+        return "design", None
+
+    class Pruner:
+        def __init__(self, record: Any, search: Any, certify: Any, spare: bool, failed: Any) -> None:
+            told.extend((spare, failed))
+            self.certify = certify
+
+        def run(self, design: Design) -> Any:
+            assert design is found
+            return self.certify("candidate"), self.certify("another")
+
+    kept = list[Design]()
+    monkeypatch.setattr(run, "rolls_far", lambda _: far)
+    monkeypatch.setattr(run, "kept_margin", lambda design: kept.append(design) or "margin")
+    monkeypatch.setattr(run, "Pruner", Pruner)
+    certifier: Any = SimpleNamespace(record=SimpleNamespace(task=task), model=None, search=None, failed={(2, 2)})
+    certifier.run, certifier.certify = lambda _: found, certify
+    assert run._certified(certifier, None) == ("design", "design")  # type: ignore[arg-type, comparison-overlap]
+    # With the margin that the certified hand keeps, which is looked for once, and no other grips.
+    assert asked == [("candidate", "margin", False), ("another", "margin", False)]
+    assert kept == [found]
+    assert told == [spare, {(2, 2)}]

@@ -301,6 +301,23 @@ def test_a_patch_resists_twisting_by_its_radius(folder: Folder, share: float) ->
     assert abs(spun) < 5e-3 if share < 1.0 else spun > 0.1
 
 
+@pytest.mark.parametrize(("weights", "stiffer"), [(1.0, 1.0), (2.0, 1.0), (8.0, 4.0)])
+def test_contacts_that_press_harder_are_stiffer(folder: Folder, weights: float, stiffer: float) -> None:
+    force = np.zeros_like(folder.motion.contact_force)
+    force[3, 1, 0] = -weights * WEIGHT
+
+    def planned(forces: np.ndarray) -> Folder:
+        return dataclasses.replace(folder, motion=dataclasses.replace(folder.motion, contact_force=forces))
+
+    def modulus(of: Folder) -> float:
+        scene = _away(of)
+        (first, *_) = scene._plant.GetCollisionGeometriesForBody(scene._plant.GetBodyByName("object"))
+        properties = scene._graph.model_inspector().GetProximityProperties(first)
+        return float(properties.GetProperty("hydroelastic", "hydroelastic_modulus"))
+
+    assert modulus(planned(force)) / modulus(planned(0 * force)) == pytest.approx(stiffer)
+
+
 def test_coefficients_of_hand_and_ground_are_the_tasks(folder: Folder) -> None:
     scene = _away(folder, friction=0.8)
     inspector, plant = scene._graph.model_inspector(), scene._plant

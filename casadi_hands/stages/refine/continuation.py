@@ -122,7 +122,7 @@ class Continuation:
         return replace(renewed, sharpness=sharpness)
 
     @property
-    def sharper(self) -> int:
+    def sharpest(self) -> int:
         """How many times motions can be sharpened."""
         return len(SHARP) - 1 - self.fine.structure.pinched
 
@@ -131,7 +131,7 @@ class Continuation:
 
         Args:
             exact: the motion, at the task's samples.
-            sharpness: how many times it has been sharpened then, at most ``sharper``.
+            sharpness: how many times it has been sharpened then, at most ``sharpest``.
             margin: to keep to the limits.
         """
         sharp = self.fine.take(LAST_STEP, exact.hand, margin, sharpness=sharpness)

@@ -6,14 +6,17 @@ from functools import cache
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from casadi_hands.geometry.bodies import Body
 from casadi_hands.nlp import Kernel
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.structure import Structure
 from casadi_hands.stages.refine.declaration import Declaration
 from casadi_hands.stages.refine.touching import runs
 from casadi_hands.terms import constraints as limits
+
+Array = NDArray[np.float64]
 
 
 @cache
@@ -62,11 +65,16 @@ def parameters(structure: Structure, motion: WholeHand) -> dict[str, ArrayLike]:
         offsets = np.ones((len(patches), body.face_bounds))
         for k, run in enumerate(runs(structure.touching[:, i])):
             known = k == 0 or model.regrasp is not None
-            wanted = np.unique(patches[run, c], axis=0) if known else motion.point[run[:1], c]
-            faces = [body.face(point) for point in wanted]
-            if all(np.array_equal(each[0], faces[0][0]) for each in faces):
-                within = np.all(wanted @ faces[0][0].T <= faces[0][1], axis=0)
-                kept = np.flatnonzero(within & (faces[0][0] @ body.centroid < faces[0][1]))
-                normals[np.ix_(run, kept)], offsets[np.ix_(run, kept)] = faces[0][0][kept], faces[0][1][kept]
+            own, reach = _bounds(body, np.unique(patches[run, c], axis=0) if known else motion.point[run[:1], c])
+            normals[run, : len(own)], offsets[run, : len(own)] = own, reach
         values |= {f"face_normals{c}": normals.reshape(len(patches), -1), f"face_offsets{c}": offsets}
     return values
+
+
+def _bounds(body: Body, points: Array) -> tuple[Array, Array]:
+    """Half-spaces (M, 3), (M,) of the face with all points (K, 3), that have these and its middle within; or none."""
+    (normals, offsets), *others = (body.face(point) for point in points)
+    if not all(np.array_equal(normals, each) for each, _ in others):
+        return np.zeros((0, 3)), np.zeros(0)
+    kept = np.all(np.vstack([points, body.centroid]) @ normals.T <= offsets, axis=0)
+    return normals[kept], offsets[kept]

@@ -37,7 +37,8 @@ WEIGHTS = {term.name: single(term.weights["refine"].default) for term in terms_o
 # One that spins resists nothing more, so that errors turn the object as far as they like; but first it must roll.
 SPIN_WEIGHT = {"penalty": 0.05, "stiff penalty": 0.2, "stiffer penalty": 0.2, "hard constraints": 0.2}
 SPIN_SCALE = {"penalty": 0.5, "stiff penalty": 0.3, "stiffer penalty": 0.3, "hard constraints": 0.3}
-SHARP = (SPIN_SCALE["hard constraints"], 0.1, 0.03)  # of hard constraints, the more that slow spins matter
+# The same rate of hard constraints at first, sharpened once, and twice, where slow spins matter.
+SHARP = (SPIN_SCALE["hard constraints"], 0.1, 0.03)
 STIFF = {"slip": 100.0, "passive_force": 30.0}
 STIFFER = STIFF | {"slip": 1000.0}
 HARD = {"slip": 100.0}  # its tolerance is there for where it is needed

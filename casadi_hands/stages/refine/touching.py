@@ -30,9 +30,8 @@ def force_ramp(bearing: NDArray[np.bool_], times: Array) -> Array:
 
 def longest_run(flags: NDArray[np.bool_], lengths: Array) -> float:
     """Longest stretch of intervals (K,) with set flags, in all of their lengths; 0 where none is set."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
     passed = np.append(0.0, np.cumsum(lengths))
-    return float((passed[edges[1::2]] - passed[edges[::2]]).max(initial=0.0))
+    return float(max((passed[run[-1] + 1] - passed[run[0]] for run in runs(flags)), default=0.0))
 
 
 def runs(flags: NDArray[np.bool_]) -> list[NDArray[np.int64]]:

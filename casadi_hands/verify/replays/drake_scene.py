@@ -21,6 +21,9 @@ from casadi_hands.verify.shapes import Shape
 PRESS = 6.0
 """Of the object's weight: what presses a fingertip to a patch of PATCH, so that it gives as much as MuJoCo's."""
 
+USUAL = 2.0
+"""Of the object's weight: where contacts are planned to press with more, that much more presses them to this patch."""
+
 PATCH = 0.375
 """Radius of that patch, of the fingertip's: (8/15) 0.375 = (2/3) 0.3, MuJoCo's torsion."""
 
@@ -155,7 +158,9 @@ class Shapes:
         tip = max(tips, default=thin)
         relative = tip * thin / (tip + thin) if np.isfinite(thin) else tip
         self._depth = (PATCH * tip) ** 2 / (2 * relative)
-        self._gradient = PRESS * folder.weight / (np.pi * relative * self._depth**2)
+        firmest = float(np.linalg.norm(folder.motion.contact_force, axis=2).max())
+        press = PRESS * max(folder.weight, firmest / USUAL)
+        self._gradient = press / (np.pi * relative * self._depth**2)
         self._mu = factor * folder.task.friction
         self._ground_mu = factor * folder.task.ground.friction if folder.task.ground is not None else 0.0
         # Drake combines coefficients to 2ab / (a + b): with the larger one on the object, there is a partner for both.

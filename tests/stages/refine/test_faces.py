@@ -7,6 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from casadi_hands.geometry.bodies.box import Box
@@ -111,11 +112,13 @@ def test_only_bodies_with_faces_have_them() -> None:
     assert not any(name.startswith("face") for name in blocks[1])
 
 
-def test_a_face_that_is_all_edge_has_no_bounds() -> None:
-    disc = "cylinder: {start: [0, 0, -0.005], end: [0, 0, 0.005], radius: 0.02, edge_radius: 1.6e-6}"
+@pytest.mark.parametrize(("edge", "bounded"), [(1.6e-6, 0), (1e-4, 8)])
+def test_a_face_that_is_all_edge_has_no_bounds(edge: float, bounded: int) -> None:
+    disc = f"cylinder: {{start: [0, 0, -0.005], end: [0, 0, 0.005], radius: 0.02, edge_radius: {edge}}}"
     text = CRATE.replace("box: {size: [0.04, 0.04, 0.06], edge_radius: 0.001}", disc)
     text += "fingers: {left: {touches: [0.006, 0, 0.005]}, right: {touches: [-0.006, 0, -0.005]}}\n"
     model = build_model(parse_task(text))
     structure = Structure.of(model, (0, 1), (2, 2), np.ones((len(model.schedule.samples), 2), bool))
     values = faces.parameters(structure, SimpleNamespace(point=None))  # type: ignore[arg-type]
-    assert not np.asarray(values["face_normals0"]).any()
+    normals = np.asarray(values["face_normals0"]).reshape(len(model.schedule.samples), 8, 3)
+    np.testing.assert_array_equal(normals.any(axis=2).sum(axis=1), bounded)

@@ -265,3 +265,14 @@ def test_hard_points_have_the_same_problem_as_ever() -> None:
     assert set(soft.parameters.names()) - set(hard.parameters.names()) >= {"torsion_radius", "spin_scale"}
     assert contact.TORSION.name in soft.terms
     assert contact.TORSION.name not in hard.terms
+
+
+@pytest.mark.parametrize(("holding", "rates"), [(3, [0.3, 0.1, 0.03]), (2, [0.1, 0.03, 0.03])])
+def test_slower_spins_count_the_more_often_a_motion_is_sharpened(holding: int, rates: list[float]) -> None:
+    model = build_model(parse_task(everything_text() + "fingertip: {torsion: 0.001}\n"))
+    active = np.ones((len(model.schedule.samples), 4), bool)
+    active[2, : 4 - holding] = False
+    stage = RefineStage(model, (0, 1, 2), (1, 2, 2), active)
+    assert [stage.given.spin_scale(sharpness) for sharpness in range(3)] == rates
+    continuation = Continuation(model, (0, 1, 2), (1, 2, 2), active)
+    assert continuation.sharpest == len(set(rates)) - 1
