@@ -33,7 +33,7 @@ What does not:
   pulls.
 - *The ground* is rigid, and a patch on it resists twisting; in ``scene.xml`` nothing does there.
 - *Stiction* creeps by some 0.01 mm/s; in ``scene.xml`` a pass of MuJoCo's own takes that back.
-- *Surfaces* are triangles, which leave the true shape by up to 0.3 of that patch's depth.
+- *Surfaces* are triangles, which leave the true shape by up to 0.1 of that patch's depth.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ PATCH = 0.375
 RELAXATION = 0.02
 """s, of contacts at the depth of that patch."""
 
-SAGITTA = 0.3
+SAGITTA = 0.1
 """By how much of that depth the triangles of a contact surface may leave the true one."""
 
 _MODULES = (
