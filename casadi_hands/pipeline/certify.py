@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from casadi_hands.diagnosis.reason import Reason
 from casadi_hands.diagnosis.refinement import failing_fingers
 from casadi_hands.diagnosis.shortcoming import shortcoming_reason
 from casadi_hands.export.design import Design
 from casadi_hands.pipeline.judge import Judge
 from casadi_hands.pipeline.record import Record
 from casadi_hands.pipeline.refiner import Refiner
-from casadi_hands.pipeline.steps import run_search, run_shortened, run_whole_hand
+from casadi_hands.pipeline.steps import run_search, run_shortened, run_whole_hand, take_up
 from casadi_hands.problem.floating_motion import Floating
+from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.model import Model
 from casadi_hands.problem.palm_motion import goals_seen_from_palm
 from casadi_hands.problem.resampling import shortened
-from casadi_hands.problem.structure import mobility
+from casadi_hands.problem.structure import Structure, mobility
+from casadi_hands.stages.refine.inter_knot import pass_through
 from casadi_hands.stages.refine.result import Refined
 from casadi_hands.stages.refine.values import Margin
 from casadi_hands.stages.synthesis.algorithm import Candidate, Found, Search
@@ -69,11 +71,11 @@ class Certifier:
         while True:
             failing: set[str] = set()
             rolling = 0  # hands that could roll
-            for candidate in found.candidates:
+            for candidate, whole in self._clear_first(found.candidates):
                 may_grow = self._more_joints(found, failing) is not None
                 if rolling >= HANDS_REFINED and may_grow:
                     break
-                judged, refined = self.certify(candidate, short)
+                judged, refined = self.refiner.certify(whole, short, homotopy=self._begun[2])
                 best = self.record.update_best(judged)
                 if judged.status == "certified":
                     return best
@@ -90,27 +92,43 @@ class Certifier:
             self.record.log("synthesis", f"another joint for {', '.join(sorted(failing)) or 'the fingers with fewest'}")
             found = run_search(self.record, self.model, self.search, least)
 
-    def certify(
-        self,
-        candidate: Candidate,
-        short: tuple[Reason, ...] = (),
-        margin: Margin | None = None,
-        grips: bool = True,
-    ) -> tuple[Design, Refined]:
+    def certify(self, candidate: Candidate, margin: Margin | None = None, grips: bool = True) -> tuple[Design, Refined]:
         """Find a hand's motion and refine it; where contacts cannot go with the object, from a shorter one on.
 
         Args:
             candidate: the hand.
-            short: what its fingers could not do before.
             margin: the first to be tried; by default what suits the hand.
             grips: whether other grips are tried where replays fail.
 
         Returns:
             the design, replayed where its files hold, and its refinement.
         """
-        model, floating, homotopy = self._begun
-        whole = run_whole_hand(self.record, model, floating, candidate)
-        return self.refiner.certify(whole, short, margin, homotopy=homotopy, grips=grips)
+        whole = self._moved(candidate)
+        return self.refiner.certify(whole, (), margin, homotopy=self._begun[2], grips=grips)
+
+    def _clear_first(self, candidates: Iterable[Candidate]) -> Iterator[tuple[Candidate, WholeHand]]:
+        """Hands and their motions, one by one; last those whose fingers pass through each other on their way.
+
+        They do so in an instant between two samples, and no refinement was seen to lead them around each other.
+        """
+        crossed = []
+        for candidate in candidates:
+            whole = self._moved(candidate)
+            model = self._begun[0]
+            structure = Structure.of(model, whole.contacts, candidate.joints, whole.active)
+            if pass_through(structure, whole):
+                self.record.log("whole_hand", "put off, as fingers pass through each other")
+                crossed.append((candidate, whole))
+            else:
+                yield candidate, whole
+        for candidate, whole in crossed:
+            take_up(self.record, self._begun[0], whole)
+            yield candidate, whole
+
+    def _moved(self, candidate: Candidate) -> WholeHand:
+        """A hand with its motion, or what refinements begin with of it."""
+        model, floating, _ = self._begun
+        return run_whole_hand(self.record, model, floating, candidate)
 
     @cached_property
     def _begun(self) -> tuple[Model, Floating, float]:

@@ -93,11 +93,16 @@ def run_whole_hand(record: Record, model: Model, floating: Floating, candidate: 
 
         result = record.journal.once("whole hand", solve)
     record.add_runs([run_record("whole_hand", "hand", task.search.seed, "", result.solution)])
-    record.set_costs("whole_hand", result.solution, weights)
+    take_up(record, model, result)
+    return result
+
+
+def take_up(record: Record, model: Model, result: WholeHand) -> None:
+    """Make the outcome of stage 3 what the record goes on from."""
+    record.set_costs("whole_hand", result.solution, _weights(record, model, "whole_hand"))
     record.set_unmet("whole_hand", unmet_bounds(model, "whole_hand", result.solution))
     adopt(record, model, result)
     record.keep_unfinished("stopped before the motion was refined")
-    return result
 
 
 def _weights(record: Record, model: Model, stage: str) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from casadi_hands.problem.model import Model
 
 LEAST_HOLDING = 3  # contacts: between fewer an object turns as it likes
 APART = 0.1  # s, how far at most the times are apart at which fingers are kept clear of each other
+CLOSE = 0.025  # s, likewise of those at which it is looked for whether they pass through each other
 
 
 @dataclass(frozen=True)
@@ -104,7 +105,16 @@ class Structure:
     @cached_property
     def inner(self) -> Inner:
         """The middle of each interval, or more times where these would be more than ``APART`` from the knots."""
-        return Inner.of(np.maximum(np.ceil(np.diff(self.model.schedule.samples) / APART - 1e-9).astype(int) - 1, 1))
+        return self._inner(APART)
+
+    @cached_property
+    def close(self) -> Inner:
+        """Likewise, ``CLOSE`` to each other."""
+        return self._inner(CLOSE)
+
+    def _inner(self, apart: float) -> Inner:
+        steps = np.diff(self.model.schedule.samples)
+        return Inner.of(np.maximum(np.ceil(steps / apart - 1e-9).astype(int) - 1, 1))
 
     @property
     def touching(self) -> NDArray[np.bool_]:

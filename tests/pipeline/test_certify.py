@@ -48,27 +48,46 @@ def found(*joints: tuple[int, int], farthest: float = 0.0) -> Found:
 
 
 class Loop(Certifier):
-    """Verdicts are given; the search returns one hand with the joints it is asked for."""
+    """Verdicts are given; the search returns one hand with the joints it is asked for.
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, verdicts: list[Verdict], max_joints: int) -> None:
+    Attributes:
+        moved: trials of the hands whose motion was looked for.
+        tried: joints of those that were refined.
+        crossing: trials of hands whose fingers pass through each other.
+    """
+
+    def __init__(
+        self, monkeypatch: pytest.MonkeyPatch, verdicts: list[Verdict], max_joints: int, crossing: Sequence[int] = ()
+    ) -> None:
         search: Any = SimpleNamespace(max_joints=max_joints)
         judge: Any = SimpleNamespace(judge=lambda design, causes: replace(design, status="failed", reason="far"))
         floating: Any = None
         task = ball_task()
         super().__init__(Record(task, None, lambda _: None), build_model(task), floating, search, judge, 1)
-        self.verdicts, self.tried = verdicts, []  # type: ignore[var-annotated]
+        self.verdicts, self.crossing = verdicts, crossing
+        self.moved: list[int] = []
+        self.tried: list[tuple[int, ...]] = []
+        self.taken_up: list[int] = []
         self.least: list[dict[int, int]] = []
         self.dropped = [0] * len(verdicts)
+        self.refiner: Any = SimpleNamespace(certify=self._refined)
         monkeypatch.setattr(certify, "run_search", self._search)
-        monkeypatch.setattr(certify, "run_whole_hand", lambda *_: self.tried.append("whole hand"))
+        monkeypatch.setattr(certify, "run_whole_hand", self._whole)
+        monkeypatch.setattr(certify, "take_up", lambda record, model, whole: self.taken_up.append(whole.trial))
+        monkeypatch.setattr(certify, "pass_through", lambda structure, whole: whole.trial in self.crossing)
 
     def _search(self, *arguments: Any) -> Found:
         self.least.append(arguments[-1])
         return found((arguments[-1][0], arguments[-1][1]))
 
-    def certify(self, candidate: Candidate, short: Any) -> tuple[Design, Any, int]:
+    def _whole(self, record: Record, model: Any, floating: Any, candidate: Candidate) -> Any:
+        self.moved.append(candidate.trial)
+        active = np.ones((len(self.model.schedule.samples), 2), bool)
+        return SimpleNamespace(contacts=(0, 1), active=active, joints=candidate.joints, trial=candidate.trial)
+
+    def _refined(self, whole: Any, short: Any, homotopy: float) -> tuple[Design, Any]:
         missed, contacts, slips = self.verdicts[len(self.tried)]
-        self.tried.append(candidate.joints)
+        self.tried.append(whole.joints)
         refined = SimpleNamespace(
             met=False,
             slips_hopelessly=slips,
@@ -89,6 +108,20 @@ def test_the_first_certified_hand_is_returned(monkeypatch: pytest.MonkeyPatch) -
     loop = Loop(monkeypatch, [(2, (), False), (0, (), False)], max_joints=3)
     assert loop.run(found((1, 1), (1, 1), (1, 1))).status == "certified"
     assert loop.tried == [(1, 1), (1, 1)]
+
+
+def test_hands_whose_fingers_pass_through_each_other_are_tried_last(monkeypatch: pytest.MonkeyPatch) -> None:
+    hands = found((1, 1), (2, 1), (1, 2))
+    loop = Loop(monkeypatch, [(0, (), False)], max_joints=3, crossing=(0, 1))
+    assert loop.run(hands).status == "certified"
+    assert (loop.tried, loop.moved, loop.taken_up) == ([(1, 2)], [0, 1, 2], [])
+    # Where none that is clear is certified, they are, with the motions that they had; and not where all are clear.
+    loop = Loop(monkeypatch, [(1, (), False), (1, (), False), (0, (), False)], max_joints=1, crossing=(0, 1))
+    assert loop.run(hands).reason == "attempt 3"
+    assert (loop.tried, loop.moved, loop.taken_up) == ([(1, 2), (1, 1), (2, 1)], [0, 1, 2], [0, 1])
+    loop = Loop(monkeypatch, [(0, (), False)], max_joints=3)
+    assert loop.run(hands).status == "certified"
+    assert (loop.tried, loop.moved) == ([(1, 1)], [0])
 
 
 def test_a_certified_hand_that_drops_the_object_makes_way_for_one_that_drops_it_less(
@@ -149,7 +182,8 @@ def test_a_structure_that_must_slip_is_tried_once(monkeypatch: pytest.MonkeyPatc
 def test_a_hand_far_from_its_contacts_is_not_refined(monkeypatch: pytest.MonkeyPatch) -> None:
     loop = Loop(monkeypatch, [], max_joints=3)
     assert loop.run(found((1, 1), farthest=0.31)).reason == "far"
-    assert loop.tried == ["whole hand"]
+    assert loop.moved == [0]
+    assert loop.tried == []
 
 
 def test_a_design_there_is_already_is_returned_where_no_hand_is_better(monkeypatch: pytest.MonkeyPatch) -> None:

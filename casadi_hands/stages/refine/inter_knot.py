@@ -20,7 +20,7 @@ def pass_through(structure: Structure, hand: WholeHand) -> bool:
         structure: of the fingers; its knots are those of the motion.
         hand: the motion.
     """
-    weights, model = structure.inner.weights(), structure.model
+    weights, model = structure.close.weights(), structure.model
     if not len(weights):
         return False
     shapes = [np.concatenate([f.base, f.lengths, f.axes.reshape(-1), f.bends.reshape(-1)]) for f in hand.fingers]

@@ -30,12 +30,12 @@ def wide() -> MadeUp:
 
 
 def shallowest(made_up: MadeUp, angles: tuple[Array, Array]) -> float:
-    """Least distance of the two fingers' surfaces between knots: in the middle, or at least every tenth of a second."""
+    """Least distance of the two fingers' surfaces between knots: in the middle, or at least every 25 ms."""
     least = np.inf
     radii = [sizes_of(made_up.model, finger.joints) for finger in made_up.start.fingers]
     fingers = [PinFinger(finger, sizes[0]) for finger, sizes in zip(made_up.start.fingers, radii, strict=True)]
     for k, step in enumerate(np.diff(made_up.model.schedule.samples)):
-        parts = next(n for n in range(2, 9) if step / n <= 0.1 + 1e-9)
+        parts = next(n for n in range(2, 20) if step / n <= 0.025 + 1e-9)
         for homotopy in np.arange(1, parts) / parts:
             links = [f.links((1 - homotopy) * a[k] + homotopy * a[k + 1]) for f, a in zip(fingers, angles, strict=True)]
             bodies = [
