@@ -97,7 +97,13 @@ FRICTION_MARGIN = Term(
 )
 SLIP = Term("slip", "Slip from knot to knot", "eq. 2.12", "length/s", weights={"refine": Weight(3.0, "knot")})
 SPIN = Term("spin", "Spin about the contact's normal", "", "rad/s", weights={"refine": Weight(0.1, "knot")})
-
+PIVOT_SLIP = Term(
+    "pivot_slip",
+    "Slip of contacts that spin, which goes with what they bear across",
+    "",
+    "length/s",
+    weights={"refine": Weight(3000.0, "knot")},
+)
 TORSION = Term("torsion", "Torsion, over its radius", "", "m·g", weights={"refine": Weight(0.01, "knot")})
 
 
@@ -190,6 +196,24 @@ def torsion_limit(pressing: SX, across: SX, friction: SX, rounding: float = 1e-6
     """
     left = pressing**2 - across / friction**2
     return ca.sqrt((left + ca.sqrt(left**2 + rounding**2)) / 2)
+
+
+def pivot_slip(spin: SX, scale: SX, across: SX, most: SX, friction: SX, radius: SX, rounding: float = 0.05) -> SX:
+    """How fast a soft fingertip that spins slips, (3,) lengths/s: ρ |w| f_t / (μ² t), normal to the torsion's ellipse.
+
+    What it bears across moves it on while its torsion is at the limit; where it rests, it does not.
+
+    Args:
+        spin: w, rad/s, about the normal.
+        scale: rate of spin that is quick, rad/s.
+        across: (3,) tangential force f_t, m·g.
+        most: the limit of the torsion over its radius, t, m·g.
+        friction: μ.
+        radius: ρ, of the torsional friction, lengths.
+        rounding: m·g, of the limit where nothing is left of it.
+    """
+    quick = spin**2 / ca.sqrt(spin**2 + scale**2)
+    return quick * radius * across / (friction**2 * (most + rounding))
 
 
 def saturated(rate: SX, scale: SX) -> SX:

@@ -2,7 +2,8 @@
 
 The moment on the object is ρ t n: ρ the radius of the torsional friction, n the object's outward normal, and t (m·g)
 the variable ``torsion``. Where a contact rests, t is whatever balance asks, within its cone together with the
-tangential force. Where it spins it is at its limit against the spin, so that the plan counts on nothing else.
+tangential force. Where it spins it is at its limit against the spin, so that the plan counts on nothing else. It
+then slips a little, too, which the plan leaves out and keeps small.
 """
 
 from __future__ import annotations
@@ -48,11 +49,12 @@ def torque(kinds: tuple[type[Body], ...]) -> Kernel:
     return kernel
 
 
-def _limit(force: SX, point: SX, body: SX, kind: type[Body], friction: SX) -> SX:
-    """The largest torsion over its radius, m·g, beside a force (3,) at a point (3,), object frame."""
+def _limit(force: SX, point: SX, body: SX, kind: type[Body], friction: SX) -> tuple[SX, SX]:
+    """The largest torsion over its radius, m·g, beside a force (3,) at a point (3,), and the part (3,) of it across."""
     normal = kind.surface(body).distance_and_normal(point, ROUNDING)[1]
     pressing = -ca.dot(force, normal)
-    return contact_terms.torsion_limit(pressing, ca.sumsqr(force + pressing * normal), friction)
+    across = force + pressing * normal
+    return contact_terms.torsion_limit(pressing, ca.sumsqr(across), friction), across
 
 
 @cache
@@ -61,7 +63,7 @@ def cone(kind: type[Body]) -> Kernel:
     kernel = Kernel("torsion_cone")
     force, point, torsion = kernel.variable("force", 3), kernel.variable("point", 3), kernel.variable("torsion", 1)
     body, friction = kernel.parameter("body", kind.width), kernel.parameter("sliding_friction")
-    kernel.constrain(limits.TORSION_CONE, _limit(force, point, body, kind, friction) ** 2 - torsion**2)
+    kernel.constrain(limits.TORSION_CONE, _limit(force, point, body, kind, friction)[0] ** 2 - torsion**2)
     return kernel
 
 
@@ -69,7 +71,8 @@ def cone(kind: type[Body]) -> Kernel:
 def law(kind: type[Body]) -> Kernel:
     """One contact's torsion from one knot to the next: at its limit against the spin, of a free size at rest.
 
-    Constraints: ``torsion_law`` (1). ``holding`` is the share of the torsion that spin leaves free, bounded.
+    Constraints: ``torsion_law`` (1). ``holding`` is the share of the torsion that spin leaves free, bounded. Costs:
+    ``pivot_slip`` (3), by which it would slip while it spins.
     """
     kernel = Kernel("torsion_law")
     forces = [kernel.variable(f"force{i}", 3, "force", i) for i in range(2)]
@@ -77,10 +80,13 @@ def law(kind: type[Body]) -> Kernel:
     torsions = [kernel.variable(f"torsion{i}", 1, "torsion", i) for i in range(2)]
     spin, body = kernel.variable("spin", 1), kernel.parameter("body", kind.width)
     friction, holding = kernel.parameter("sliding_friction"), kernel.variable("holding", 1)
-    fully = contact_terms.saturated(spin, kernel.parameter("spin_scale"))
-    most = sum(_limit(f, p, body, kind, friction) for f, p in zip(forces, points, strict=True)) / 2
+    scale, radius = kernel.parameter("spin_scale"), kernel.parameter("torsion_radius")
+    fully = contact_terms.saturated(spin, scale)
+    limited = [_limit(f, p, body, kind, friction) for f, p in zip(forces, points, strict=True)]
+    most, across = ((limited[0][k] + limited[1][k]) / 2 for k in range(2))
     mean = (torsions[0] + torsions[1]) / 2
     kernel.constrain(limits.TORSION_LAW, mean + most * (fully - (1 - fully**2) * holding))
+    kernel.cost(contact_terms.PIVOT_SLIP, contact_terms.pivot_slip(spin, scale, across, most, friction, radius))
     return kernel
 
 
@@ -129,6 +135,6 @@ def bind(of: Declaration) -> None:
             },
             spin=of.spin.take(start).entries(i, i + 1, c),
             holding=of.holding.take(start).entries(i, i + 1, c),
-            **problem.given("sliding_friction", "spin_scale"),
+            **problem.given("sliding_friction", "spin_scale", "torsion_radius"),
             **of.of(c, start, "body"),
         )

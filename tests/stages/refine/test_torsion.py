@@ -109,7 +109,7 @@ def test_the_law_leaves_moments_free_at_rest_and_none_where_contacts_spin(kind: 
     variables: dict[str, object] = {"spin": spin, "holding": holding}
     for i in range(2):
         variables |= {f"force{i}": forces[i], f"point{i}": points[i], f"torsion{i}": torsions[i]}
-    parameters = {"body": body, "sliding_friction": 0.6, "spin_scale": scale}
+    parameters = {"body": body, "sliding_friction": 0.6, "spin_scale": scale, "torsion_radius": 0.07}
     off = numbers(torsion.law(kind), variables, parameters)["torsion_law"]
     limit = np.mean([most(f, p, body, 0.6) for f, p in zip(forces, points, strict=True)])
     share = spin / np.hypot(spin, scale)  # of the limit that acts against the spin
@@ -119,6 +119,33 @@ def test_the_law_leaves_moments_free_at_rest_and_none_where_contacts_spin(kind: 
     # Where it spins fast there is one moment: at the limit against the spin.
     if abs(spin) > 1.0:
         assert due == pytest.approx(-np.sign(spin) * limit, rel=1e-3)
+
+
+@pytest.mark.parametrize(("kind", "body"), list(zip(KINDS, BODIES, strict=True)))
+def test_a_contact_that_spins_slips_normal_to_the_ellipse_and_one_at_rest_does_not(kind: type, body: Array) -> None:
+    rng, friction, radius = np.random.default_rng(4), 0.6, 0.07
+    point = near(body, rng)
+    force, normal = pressed(point, body, rng), normal_at(point, body)
+    across, limit = force - (force @ normal) * normal, most(force, point, body, friction)
+
+    def used(load: Array) -> float:
+        return float(load[:3] @ load[:3] / friction**2 + load[3] ** 2 / radius**2)
+
+    kernel = torsion.law(kind)
+    terms = ca.Function("terms", [kernel.variables, kernel.parameters], [kernel.terms[contact.PIVOT_SLIP.name]])
+    for spin in (-3.0, 0.0, 5.0):
+        parameters = {"body": body, "sliding_friction": friction, "spin_scale": 1e-3, "torsion_radius": radius}
+        variables = {"spin": spin, "holding": 0.0}
+        for i in range(2):
+            variables |= {f"force{i}": force, f"point{i}": point, f"torsion{i}": 0.0}
+        cost = float(terms(*packed(kernel, variables, parameters)))
+        # Forces on the object slow what the object does.
+        load = np.append(across, -np.sign(spin) * radius * limit)
+        steps = 1e-6 * np.eye(4)
+        outward = np.array([used(load + step) - used(load - step) for step in steps]) / 2e-6
+        slip = outward[:3] * (spin / outward[3] if spin else 0.0)
+        # The limit is rounded by 0.05.
+        assert np.sqrt(cost) == pytest.approx(np.linalg.norm(slip) * limit / (limit + 0.05), rel=1e-4)
 
 
 # A ball with its centre of mass far below its centre hangs between two fingertips, tilted, and is let down: what turns
@@ -232,7 +259,7 @@ def test_where_contacts_spin_their_moments_are_at_the_limit_against_the_spin(let
     for side, c in ((-1.0, 0), (1.0, 1)):
         rates = spin_rates(let_down.folder, build_trajectory(let_down.folder, shoot(let_down.folder)), c)
         share = rates / np.hypot(rates, SHARP[-1])
-        quick = np.abs(rates) > 0.4
+        quick = np.abs(rates) > 0.3
         assert np.sum(quick) >= 6
         assert np.all(-side * rates[quick] > 0.0)
         mean = (moments[1:, c] + moments[:-1, c]) / (limits[1:, c] + limits[:-1, c])
