@@ -129,7 +129,7 @@ class RefineStage:
         elif start.coupling is not None and len(steps) > 1:
             graded_steps = closing(steps)
         for (what, given_weights, options), scale in graded_steps:
-            weights = self._all_weights(what, given_weights)
+            weights = self._all_weights(what, given_weights, sharpness)
             most, before = max(slips.values(), default=0.0), most
             if what == "stiffer penalty" and not hopeless < most < FALLING * before:
                 continue
@@ -185,14 +185,18 @@ class RefineStage:
 
     def costs(self, step: Step, start: WholeHand, margin: Margin) -> dict[str, float]:
         """The weighted terms of a motion, as a step weights them."""
-        weights = self._all_weights(step[0], step[1])
+        weights = self._all_weights(step[0], step[1], sharpness=0)
         parameters = self.given.parameters(start, margin) | self._weighted(weights)
         return self.solver.evaluate(self.given.start(start), parameters)
 
-    def _all_weights(self, what: str, weights: Mapping[str, float]) -> dict[str, float]:
-        """A step's weights, those of soft fingertips, and those of a person's own terms."""
+    def _all_weights(self, what: str, weights: Mapping[str, float], sharpness: int) -> dict[str, float]:
+        """A step's weights, those of soft fingertips, and those of a person's own terms.
+
+        How far contacts slip that spin counts once a motion is sharpened: from afar it was seen to lead astray.
+        """
         soft = {"spin": SPIN_WEIGHT[what]} if self.model.torsion else {}
-        return {**weights, **soft, **own_weights(self.model, "refine")}
+        early = {} if sharpness else {"pivot_slip": 0.0}
+        return {**weights, **soft, **early, **own_weights(self.model, "refine")}
 
     def _weighted(self, weights: Mapping[str, float]) -> dict[str, ArrayLike]:
         return {f"weight.{term}": weights[term] / self.given.knots for term in self.problem.terms}

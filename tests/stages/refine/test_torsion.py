@@ -243,6 +243,7 @@ def let_down(tmp_path_factory: pytest.TempPathFactory) -> LetDown:
 def test_where_contacts_spin_their_moments_are_at_the_limit_against_the_spin(let_down: LetDown) -> None:
     motion = let_down.motion
     assert let_down.refined.exact
+    assert let_down.refined.weights[contact.PIVOT_SLIP.name] > 0.0  # of a sharpened motion
     assert motion.contact_moment is not None
     limits, moments = np.zeros((2, len(motion.time), 2))
     for k, quaternion in enumerate(motion.object_orientation):
