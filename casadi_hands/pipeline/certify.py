@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from casadi_hands.diagnosis.refinement import failing_fingers
 from casadi_hands.diagnosis.shortcoming import shortcoming_reason
 from casadi_hands.export.design import Design
+from casadi_hands.nlp import SolverError
 from casadi_hands.pipeline.judge import Judge
 from casadi_hands.pipeline.record import Record
 from casadi_hands.pipeline.refiner import Refiner
@@ -72,9 +73,6 @@ class Certifier:
             failing: set[str] = set()
             rolling = 0  # hands that could roll
             for candidate, whole in self._clear_first(found.candidates):
-                may_grow = self._more_joints(found, failing) is not None
-                if rolling >= HANDS_REFINED and may_grow:
-                    break
                 judged, refined = self.refiner.certify(whole, short, homotopy=self._begun[2])
                 best = self.record.update_best(judged)
                 if judged.status == "certified":
@@ -86,6 +84,8 @@ class Certifier:
                 if refined.barely_rolls and mobility(candidate.joints, touching) < MOBILE:
                     break  # a structure that must slip will do so in any of its hands
                 rolling += not refined.barely_rolls
+                if rolling >= HANDS_REFINED and self._more_joints(found, failing) is not None:
+                    break
             least = self._more_joints(found, failing)
             if least is None:
                 return best
@@ -110,20 +110,28 @@ class Certifier:
         """Hands and their motions, one by one; last those whose fingers pass through each other on their way.
 
         They do so in an instant between two samples, and no refinement was seen to lead them around each other.
+
+        Raises:
+            SolverError: a solver broke off; not before those that were put off have been tried.
         """
-        crossed = []
+        crossed, model, broke_off = [], self._begun[0], None
         for candidate in candidates:
-            whole = self._moved(candidate)
-            model = self._begun[0]
+            try:
+                whole = self._moved(candidate)
+            except SolverError as error:
+                broke_off = error
+                break
             structure = Structure.of(model, whole.contacts, candidate.joints, whole.active)
-            if pass_through(structure, whole):
+            if pass_through(structure, whole, structure.close_times):
                 self.record.log("whole_hand", "put off, as fingers pass through each other")
                 crossed.append((candidate, whole))
             else:
                 yield candidate, whole
         for candidate, whole in crossed:
-            take_up(self.record, self._begun[0], whole)
+            take_up(self.record, model, whole)
             yield candidate, whole
+        if broke_off is not None:
+            raise broke_off
 
     def _moved(self, candidate: Candidate) -> WholeHand:
         """A hand with its motion, or what refinements begin with of it."""

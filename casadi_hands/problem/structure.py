@@ -13,7 +13,7 @@ from casadi_hands.problem.model import Model
 
 LEAST_HOLDING = 3  # contacts: between fewer an object turns as it likes
 APART = 0.1  # s, how far at most the times are apart at which fingers are kept clear of each other
-CLOSE = 0.025  # s, likewise of those at which it is looked for whether they pass through each other
+CLOSE_APART = 0.025  # s, likewise of those at which it is looked for whether they pass through each other
 
 
 @dataclass(frozen=True)
@@ -108,9 +108,9 @@ class Structure:
         return self._inner(APART)
 
     @cached_property
-    def close(self) -> Inner:
-        """Likewise, ``CLOSE`` to each other."""
-        return self._inner(CLOSE)
+    def close_times(self) -> Inner:
+        """The same with at most ``CLOSE_APART`` from one time to the next."""
+        return self._inner(CLOSE_APART)
 
     def _inner(self, apart: float) -> Inner:
         steps = np.diff(self.model.schedule.samples)

@@ -99,7 +99,7 @@ SLIP = Term("slip", "Slip from knot to knot", "eq. 2.12", "length/s", weights={"
 SPIN = Term("spin", "Spin about the contact's normal", "", "rad/s", weights={"refine": Weight(0.1, "knot")})
 PIVOT_SLIP = Term(
     "pivot_slip",
-    "Slip of contacts that spin, which goes with what they bear across",
+    "Slip of contacts that spin, which goes with what they bear across; 0 until a motion resists slow spins",
     "",
     "length/s",
     weights={"refine": Weight(3000.0, "knot")},

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from casadi_hands.export.design import Design
+from casadi_hands.nlp import SolverError
 from casadi_hands.pipeline import certify, halving
 from casadi_hands.pipeline import refiner as refiner_module
 from casadi_hands.pipeline.certify import Certifier
@@ -54,6 +55,7 @@ class Loop(Certifier):
         moved: trials of the hands whose motion was looked for.
         tried: joints of those that were refined.
         crossing: trials of hands whose fingers pass through each other.
+        breaks: trial of the hand whose motion breaks off.
     """
 
     def __init__(
@@ -64,7 +66,7 @@ class Loop(Certifier):
         floating: Any = None
         task = ball_task()
         super().__init__(Record(task, None, lambda _: None), build_model(task), floating, search, judge, 1)
-        self.verdicts, self.crossing = verdicts, crossing
+        self.verdicts, self.crossing, self.breaks = verdicts, crossing, -1
         self.moved: list[int] = []
         self.tried: list[tuple[int, ...]] = []
         self.taken_up: list[int] = []
@@ -74,13 +76,15 @@ class Loop(Certifier):
         monkeypatch.setattr(certify, "run_search", self._search)
         monkeypatch.setattr(certify, "run_whole_hand", self._whole)
         monkeypatch.setattr(certify, "take_up", lambda record, model, whole: self.taken_up.append(whole.trial))
-        monkeypatch.setattr(certify, "pass_through", lambda structure, whole: whole.trial in self.crossing)
+        monkeypatch.setattr(certify, "pass_through", lambda structure, whole, times: whole.trial in self.crossing)
 
     def _search(self, *arguments: Any) -> Found:
         self.least.append(arguments[-1])
         return found((arguments[-1][0], arguments[-1][1]))
 
     def _whole(self, record: Record, model: Any, floating: Any, candidate: Candidate) -> Any:
+        if candidate.trial == self.breaks:
+            raise SolverError("it broke off")
         self.moved.append(candidate.trial)
         active = np.ones((len(self.model.schedule.samples), 2), bool)
         return SimpleNamespace(contacts=(0, 1), active=active, joints=candidate.joints, trial=candidate.trial)
@@ -122,6 +126,12 @@ def test_hands_whose_fingers_pass_through_each_other_are_tried_last(monkeypatch:
     loop = Loop(monkeypatch, [(0, (), False)], max_joints=3)
     assert loop.run(hands).status == "certified"
     assert (loop.tried, loop.moved) == ([(1, 1)], [0])
+    # Nor is one lost where the solver breaks off after it was put off.
+    loop = Loop(monkeypatch, [(1, (), False)], max_joints=1, crossing=(0,))
+    loop.breaks = 1
+    with pytest.raises(SolverError):
+        loop.run(hands)
+    assert (loop.tried, loop.moved) == ([(1, 1)], [0])
 
 
 def test_a_certified_hand_that_drops_the_object_makes_way_for_one_that_drops_it_less(
@@ -161,6 +171,7 @@ def test_all_hands_are_tried_where_no_finger_may_have_another_joint(monkeypatch:
     loop = Loop(monkeypatch, [*verdicts, (1, (1,), False)], max_joints=2)
     loop.run(found((1, 1), (1, 1), (1, 1), (1, 1)))
     assert loop.tried == [(1, 1), (1, 1), (1, 2), (2, 2)]
+    assert loop.moved == [0, 1, 0, 0]  # and no motion is looked for that is not refined
 
 
 def test_where_no_finger_is_to_blame_those_with_fewest_joints_get_one(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -43,6 +43,7 @@ from casadi_hands.stages.refine.settings import (
 from casadi_hands.stages.refine.sliding import SLIP_SCALE
 from casadi_hands.stages.refine.tightest import tightest
 from casadi_hands.stages.refine.values import Margin, RefineValues
+from casadi_hands.terms import contact as contact_terms
 
 
 class RefineStage:
@@ -82,14 +83,14 @@ class RefineStage:
     ) -> Refined:
         """``take``, and where fingers pass through each other between knots again, with them kept clear there, too."""
         refined = self.take(steps, start, margin, homotopy, wanted)
-        if not refined.met or not self.passes_through(refined):
+        if not refined.met or not pass_through(self.structure, refined.hand, self.structure.inner):
             return refined
         guarded = self._guarded.take(steps, start, margin, homotopy, wanted)
         return replace(guarded, runs=refined.runs + guarded.runs)
 
     def passes_through(self, refined: Refined) -> bool:
         """Whether fingers of a motion on the stage's knots pass through each other between them."""
-        return pass_through(self.structure, refined.hand)
+        return pass_through(self.structure, refined.hand, self.structure.close_times)
 
     @cached_property
     def _guarded(self) -> RefineStage:
@@ -195,7 +196,7 @@ class RefineStage:
         How far contacts slip that spin counts once a motion is sharpened: from afar it was seen to lead astray.
         """
         soft = {"spin": SPIN_WEIGHT[what]} if self.model.torsion else {}
-        early = {} if sharpness else {"pivot_slip": 0.0}
+        early = {} if sharpness else {contact_terms.PIVOT_SLIP.name: 0.0}
         return {**weights, **soft, **early, **own_weights(self.model, "refine")}
 
     def _weighted(self, weights: Mapping[str, float]) -> dict[str, ArrayLike]:

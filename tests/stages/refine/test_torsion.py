@@ -123,29 +123,31 @@ def test_the_law_leaves_moments_free_at_rest_and_none_where_contacts_spin(kind: 
 
 @pytest.mark.parametrize(("kind", "body"), list(zip(KINDS, BODIES, strict=True)))
 def test_a_contact_that_spins_slips_normal_to_the_ellipse_and_one_at_rest_does_not(kind: type, body: Array) -> None:
-    rng, friction, radius = np.random.default_rng(4), 0.6, 0.07
-    point = near(body, rng)
-    force, normal = pressed(point, body, rng), normal_at(point, body)
-    across, limit = force - (force @ normal) * normal, most(force, point, body, friction)
+    rng, friction, radius, scale = np.random.default_rng(4), 0.6, 0.07, 0.05
+    points = [near(body, rng) for _ in range(2)]
+    forces = [pressed(point, body, rng) for point in points]
+    normals = [normal_at(point, body) for point in points]
+    across = np.mean([f - (f @ n) * n for f, n in zip(forces, normals, strict=True)], axis=0)
+    limit = np.mean([most(f, p, body, friction) for f, p in zip(forces, points, strict=True)])
 
     def used(load: Array) -> float:
         return float(load[:3] @ load[:3] / friction**2 + load[3] ** 2 / radius**2)
 
     kernel = torsion.law(kind)
     terms = ca.Function("terms", [kernel.variables, kernel.parameters], [kernel.terms[contact.PIVOT_SLIP.name]])
-    for spin in (-3.0, 0.0, 5.0):
-        parameters = {"body": body, "sliding_friction": friction, "spin_scale": 1e-3, "torsion_radius": radius}
+    for spin, quickly in ((-3.0, 1.0), (0.0, 0.0), (5.0, 1.0), (scale, np.sqrt(0.5))):
+        parameters = {"body": body, "sliding_friction": friction, "spin_scale": scale, "torsion_radius": radius}
         variables = {"spin": spin, "holding": 0.0}
         for i in range(2):
-            variables |= {f"force{i}": force, f"point{i}": point, f"torsion{i}": 0.0}
+            variables |= {f"force{i}": forces[i], f"point{i}": points[i], f"torsion{i}": 0.0}
         cost = float(terms(*packed(kernel, variables, parameters)))
         # Forces on the object slow what the object does.
         load = np.append(across, -np.sign(spin) * radius * limit)
         steps = 1e-6 * np.eye(4)
         outward = np.array([used(load + step) - used(load - step) for step in steps]) / 2e-6
-        slip = outward[:3] * (spin / outward[3] if spin else 0.0)
+        slip = quickly * outward[:3] * (spin / outward[3] if spin else 0.0)
         # The limit is rounded by 0.05.
-        assert np.sqrt(cost) == pytest.approx(np.linalg.norm(slip) * limit / (limit + 0.05), rel=1e-4)
+        assert np.sqrt(cost) == pytest.approx(np.linalg.norm(slip) * limit / (limit + 0.05), rel=1e-3)
 
 
 # A ball with its centre of mass far below its centre hangs between two fingertips, tilted, and is let down: what turns
