@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,12 @@ class Hull:
     reaches: Array
     corners: Array
     triangles: NDArray[np.int_]
+
+    def placed(self, rotation: Array, position: Array) -> Hull:
+        """The same polytope turned by a rotation (3, 3), then shifted by (3,): faces and corners stay what they are."""
+        normals = self.normals @ rotation.T
+        corners = self.corners @ rotation.T + position
+        return replace(self, normals=normals, reaches=self.reaches + normals @ position, corners=corners)
 
 
 def hull_of(points: Array) -> Hull:

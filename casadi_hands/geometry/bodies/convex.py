@@ -119,6 +119,8 @@ class Convex(Body):
     kind: ClassVar[str] = "convex"
     face_bounds: ClassVar[int] = _MOST_BOUNDS
     counts: ClassVar[tuple[int, int]]
+    _hull: ClassVar[Any]  # of each body a `Hull`, or None where there is none, and no field
+    _core: ClassVar[Any]  # likewise
     vertices: Array = field(metadata={"about": "Its corners, m, object frame; a list of four or more.", "is": "points"})
     edge_radius: float = field(metadata=edge_metadata(_edge, "a hundredth of half the least width", "square edges"))
 
@@ -128,30 +130,17 @@ class Convex(Body):
         with contextlib.suppress(QhullError, ValueError):
             hull = hull_of(np.asarray(vertices, float))
             core = within(hull, edge_radius)
-        made = object.__new__(_of_counts(len(hull.normals), len(core.corners)) if hull and core else Convex)
-        # All of it here: Python calls no `__init__` of what is not of the class that was asked for.
-        for name, value in (("vertices", vertices), ("edge_radius", edge_radius), ("_made", (hull, core))):
-            object.__setattr__(made, name, value)
-        return made
+        return _of_hulls(vertices, edge_radius, hull, core)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """How it is sent to another process: classes by counts are made there."""
-        return Convex, (self.vertices, self.edge_radius)
+        return _of_hulls, (self.vertices, self.edge_radius, self._hull, self._core)
 
     def impossible(self) -> str:
         """See `Body`."""
-        hull, core = self._made  # type: ignore[attr-defined]
-        if hull is None:
+        if self._hull is None:
             return "four points or more that do not lie in one plane"
-        return "" if core else "an edge_radius smaller than half its least width"
-
-    @property
-    def _hull(self) -> Hull:
-        return self._made[0]  # type: ignore[attr-defined,no-any-return]
-
-    @property
-    def _core(self) -> Hull:
-        return self._made[1]  # type: ignore[attr-defined,no-any-return]
+        return "" if self._core else "an edge_radius smaller than half its least width"
 
     @property
     def ball(self) -> float:
@@ -181,7 +170,7 @@ class Convex(Body):
         middles = np.array([self._middle(n, d) for n, d in zip(hull.normals, hull.reaches, strict=True)])
         for _ in range(_ROUNDS):
             reaches += self._chosen(middles, reaches)[0]
-        return reaches
+        return np.asarray(reaches)
 
     def _middle(self, normal: Array, reach: float) -> Array:
         """Middle (3,) of a face."""
@@ -278,7 +267,11 @@ class Convex(Body):
 
     def placed(self, rotation: Array, position: Array) -> Convex:
         """See `Body`."""
-        return replace(self, vertices=np.asarray(self.vertices) @ rotation.T + position)
+        # Found anew, a hull of turned points might be rounded to more or fewer faces, which kernels differ by.
+        hull, core = (each.placed(rotation, position) for each in (self._hull, self._core))
+        made = _of_hulls(np.asarray(self.vertices) @ rotation.T + position, self.edge_radius, hull, core)
+        vars(made)["_reaches"] = self._reaches + hull.normals @ position
+        return made
 
     def edges(self) -> list[tuple[Array, Array]]:
         """See `Body`."""
@@ -290,6 +283,14 @@ class Convex(Body):
         """See `Body`."""
         hull = self._hull
         return (Solid("convex", np.zeros(3), np.zeros(3), vertices=hull.corners, triangles=hull.triangles),)
+
+
+def _of_hulls(vertices: Array, edge_radius: float, hull: Hull | None, core: Hull | None) -> Convex:
+    """The body of some points whose hull and core are known; None of those that there are none of."""
+    made = object.__new__(_of_counts(len(hull.normals), len(core.corners)) if hull and core else Convex)
+    # All of it here: Python calls no `__init__` of what is not of the class that was asked for.
+    vars(made).update(vertices=vertices, edge_radius=edge_radius, _hull=hull, _core=core)
+    return made
 
 
 @cache

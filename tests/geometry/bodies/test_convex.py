@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
 import pickle
 from dataclasses import replace
 
 import coal
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from casadi_hands.geometry.bodies import KINDS
 from casadi_hands.geometry.bodies.box import Box
 from casadi_hands.geometry.bodies.convex import Convex
+from casadi_hands.geometry.hull import ALIKE, hull_of
 from tests.geometry.bodies import checks
 
 CRATE = Box(np.array([0.1, -0.2, 0.3]), np.array([0.8, 1.4, 2.0]), np.array([0.3, -0.5, 0.9]), 0.01)
@@ -93,6 +96,23 @@ def test_what_has_other_counts_is_of_another_class() -> None:
     other = replace(SAME, vertices=WEDGE.vertices)
     assert type(other) is type(WEDGE) is not type(SAME)
     np.testing.assert_array_equal(other.parameters, WEDGE.parameters)
+
+
+def test_turned_it_has_the_faces_and_corners_that_it_had(rng: np.random.Generator) -> None:
+    # Corners that are off the faces of a box by less than what makes two faces of one, near the origin.
+    corners = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+    counts = set()
+    for _ in range(40):
+        body = Convex(corners + rng.uniform(-ALIKE / 2, ALIKE / 2, corners.shape), 0.05)
+        turn, shift = Rotation.random(random_state=rng).as_matrix(), 10 * rng.normal(size=3)
+        placed = body.placed(turn, shift)
+        assert type(placed) is type(body)
+        assert type(pickle.loads(pickle.dumps(placed))) is type(body)
+        assert len(placed.parameters) == placed.width
+        counts.add(len(hull_of(placed.vertices).normals) - body.counts[0])
+        point = 3 * rng.normal(size=3)
+        assert placed.signed_distance(turn @ point + shift) == pytest.approx(body.signed_distance(point), abs=1e-9)
+    assert counts != {0}  # found anew, hulls have others
 
 
 def test_a_task_file_gives_a_polytope() -> None:
