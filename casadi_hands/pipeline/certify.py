@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from casadi_hands.diagnosis.reason import Reason
 from casadi_hands.diagnosis.refinement import failing_fingers
 from casadi_hands.diagnosis.shortcoming import shortcoming_reason
 from casadi_hands.export.design import Design
@@ -73,7 +74,7 @@ class Certifier:
             failing: set[str] = set()
             rolling = 0  # hands that could roll
             for candidate, whole in self._clear_first(found.candidates):
-                judged, refined = self.refiner.certify(whole, short, homotopy=self._begun[2])
+                judged, refined = self._refined(whole, short)
                 best = self.record.update_best(judged)
                 if judged.status == "certified":
                     return best
@@ -103,8 +104,7 @@ class Certifier:
         Returns:
             the design, replayed where its files hold, and its refinement.
         """
-        whole = self._moved(candidate)
-        return self.refiner.certify(whole, (), margin, homotopy=self._begun[2], grips=grips)
+        return self._refined(self._moved(candidate), (), margin, grips)
 
     def _clear_first(self, candidates: Iterable[Candidate]) -> Iterator[tuple[Candidate, WholeHand]]:
         """Hands and their motions, one by one; last those whose fingers pass through each other on their way.
@@ -114,7 +114,7 @@ class Certifier:
         Raises:
             SolverError: a solver broke off; not before those that were put off have been tried.
         """
-        crossed, model, broke_off = [], self._begun[0], None
+        (model, _, _), crossed, broke_off = self._begun, [], None
         for candidate in candidates:
             try:
                 whole = self._moved(candidate)
@@ -137,6 +137,13 @@ class Certifier:
         """A hand with its motion, or what refinements begin with of it."""
         model, floating, _ = self._begun
         return run_whole_hand(self.record, model, floating, candidate)
+
+    def _refined(
+        self, whole: WholeHand, short: tuple[Reason, ...], margin: Margin | None = None, grips: bool = True
+    ) -> tuple[Design, Refined]:
+        """A hand refined from the homotopy parameter of its motion on; ``short``: what its fingers could not do."""
+        _, _, homotopy = self._begun
+        return self.refiner.certify(whole, short, margin, homotopy=homotopy, grips=grips)
 
     @cached_property
     def _begun(self) -> tuple[Model, Floating, float]:

@@ -199,9 +199,9 @@ def torsion_limit(pressing: SX, across: SX, friction: SX, rounding: float = 1e-6
 
 
 def pivot_slip(spin: SX, scale: SX, across: SX, most: SX, friction: SX, radius: SX, rounding: float = 0.05) -> SX:
-    """How fast a soft fingertip that spins slips, (3,) lengths/s: ρ |w| f_t / (μ² t), normal to the torsion's ellipse.
+    """How fast a soft fingertip that spins slips, (3,) lengths/s: ρ |w| f_t / (μ² t), and nothing where it rests.
 
-    What it bears across moves it on while its torsion is at the limit; where it rests, it does not.
+    Slip and spin together are normal to the ellipse of `torsion_limit`. |w| is smooth: w²/√(w² + scale²).
 
     Args:
         spin: w, rad/s, about the normal.

@@ -54,6 +54,7 @@ class Loop(Certifier):
     Attributes:
         moved: trials of the hands whose motion was looked for.
         tried: joints of those that were refined.
+        taken_up: trials of those that had been put off.
         crossing: trials of hands whose fingers pass through each other.
         breaks: trial of the hand whose motion breaks off.
     """
@@ -72,7 +73,7 @@ class Loop(Certifier):
         self.taken_up: list[int] = []
         self.least: list[dict[int, int]] = []
         self.dropped = [0] * len(verdicts)
-        self.refiner: Any = SimpleNamespace(certify=self._refined)
+        self.refiner: Any = SimpleNamespace(certify=self._verdict)
         monkeypatch.setattr(certify, "run_search", self._search)
         monkeypatch.setattr(certify, "run_whole_hand", self._whole)
         monkeypatch.setattr(certify, "take_up", lambda record, model, whole: self.taken_up.append(whole.trial))
@@ -89,7 +90,8 @@ class Loop(Certifier):
         active = np.ones((len(self.model.schedule.samples), 2), bool)
         return SimpleNamespace(contacts=(0, 1), active=active, joints=candidate.joints, trial=candidate.trial)
 
-    def _refined(self, whole: Any, short: Any, homotopy: float) -> tuple[Design, Any]:
+    def _verdict(self, whole: Any, short: Any, margin: Any, homotopy: float, grips: bool) -> tuple[Design, Any]:
+        assert (margin, homotopy, grips) == (None, 1.0, True)
         missed, contacts, slips = self.verdicts[len(self.tried)]
         self.tried.append(whole.joints)
         refined = SimpleNamespace(

@@ -129,6 +129,8 @@ class Continuation:
     def sharpened(self, exact: Refined, sharpness: int, margin: Margin) -> Refined:
         """Refine an exact motion such that contacts which spin slowly have their torsion at its limit, too.
 
+        How far those slip that spin counts then.
+
         Args:
             exact: the motion, at the task's samples.
             sharpness: how many times it has been sharpened then, at most ``sharpest``.
