@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import casadi as ca
-from casadi import SX
+from casadi import SX, Function
 
-from casadi_hands.geometry.bodies.body import Core
+from casadi_hands.geometry.bodies.body import Core, Placed
 from casadi_hands.geometry.bodies.capsule import Segment
 from casadi_hands.geometry.bodies.sphere import Point
 from casadi_hands.geometry.segments import point_segment_distance, segment_distance
@@ -29,14 +30,51 @@ def _segment_and_point(one: Segment, other: Point) -> SX:
 
 
 def _segment_and_core(one: Segment, other: Core) -> SX:
-    """The least over the segment of the distance from a convex set, which is convex: where its slope vanishes.
+    """The least over the segment of the distance from a convex set, which is constant in its own frame.
 
-    The root is bracketed by the segment's ends and narrowed by halves and by false position, whose steps are constants
-    to derivatives; a step of Newton's from where they end has those of the root. Where the segment runs along a face,
-    so that all of it is as near, that step is held back.
+    All that it takes to find it is a function of its own, whose results are constants to derivatives: those of the
+    distance are a quadratic's. So they cost the same however many faces the core has.
     """
-    along = one.end - one.start
-    slope = other.slopes(one.start, along)
+    start, end, core = one.start, one.end, other
+    if isinstance(other, Placed):
+        start, end, core = other.own(one.start), other.own(one.end), other.core
+    parts = list(vars(core).values())  # its fields
+    nearest, used = _nearest(type(core), tuple(part.shape for part in parts))
+    here = constant(start), constant(end)
+    # Rounded, too: that is what makes them constants.
+    value, gradient, bends = (constant(x) for x in nearest(*here, *[parts[k] for k in used]))
+    moved = ca.vertcat(start, end) - ca.vertcat(*here)
+    return value + ca.dot(moved, gradient + ca.mtimes(bends, moved))
+
+
+def _expanded(value: SX, x: SX, at: SX) -> tuple[SX, SX, SX]:
+    """A function's value, gradient (n,) and Hessian (n, n) at a point (n,)."""
+    hessian, gradient = ca.hessian(value, x)
+    found = ca.substitute(ca.horzcat(ca.densify(hessian), gradient, value * SX.ones(x.shape)), x, at)
+    return found[0, -1], found[:, -2], found[:, :-2]
+
+
+@cache
+def _nearest(kind: type[Core], shapes: tuple[tuple[int, int], ...]) -> tuple[Function, list[int]]:
+    """What finds how near a segment is to a core, and which of the core's fields it takes.
+
+    The distance is convex along the segment, so its slope vanishes at one place. That is bracketed by the segment's
+    ends and narrowed by halves and by false position, then a step of Newton's is made. How the place moves with the
+    ends follows from the slope's derivatives; where the segment runs along a face, so that all of it is as near, it
+    stays.
+
+    Args:
+        kind: of the core.
+        shapes: of its fields.
+
+    Returns:
+        Both ends (3,) and fields -> the distance, its gradient (6,) by the ends, and half of its Hessian (6, 6), that
+        of what stands above the diagonal twice and below not.
+    """
+    start, end, at = SX.sym("start", 3), SX.sym("end", 3), SX.sym("at")
+    parts = [SX.sym(f"part{k}", *shape) for k, shape in enumerate(shapes)]
+    core, along = kind(*parts), end - start
+    slope = core.slopes(start, along)
 
     def within(low: SX, high: SX, below: SX, above: SX) -> SX:
         # Clamped, since the slopes at both ends of the bracket may vanish.
@@ -47,19 +85,37 @@ def _segment_and_core(one: Segment, other: Core) -> SX:
     first, last = below >= 0, above <= 0  # where the nearest point is an end
     for _ in range(_ROUNDS):
         # By halves, too: along a face the slope is next to nothing until an edge, where it jumps.
-        for where in ((low + high) / 2, None):
-            at = within(low, high, below, above) if where is None else where
-            here = slope(at)
+        for halved in (True, False):
+            where = (low + high) / 2 if halved else within(low, high, below, above)
+            here = slope(where)
             before = here < 0
-            low, high = ca.if_else(before, at, low), ca.if_else(before, high, at)
+            low, high = ca.if_else(before, where, low), ca.if_else(before, high, where)
             below, above = ca.if_else(before, here, below), ca.if_else(before, above, here)
-    found = constant(within(low, high, below, above))
-    share = SX.sym("share")
-    bend = ca.substitute(ca.gradient(slope(share), share), share, found) + _TIE * ca.sumsqr(along)
-    step = -slope(found) / bend
-    newton = clamp(found + clamp(step, -_STEP, _STEP), 0, 1)
-    nearest = one.start + ca.if_else(first, 0, ca.if_else(last, 1, newton)) * along
-    return other.distance_and_normal(nearest, _ROUNDING)[0]
+    found = within(low, high, below, above)
+    ends = ca.vertcat(start, end)
+    value, rates, bends = _expanded(slope(at), ca.vertcat(at, ends), ca.vertcat(found, ends))
+    bend = rates[0] + _TIE * ca.sumsqr(along)
+    step = -value / bend
+    newton = found + clamp(step, -_STEP, _STEP)
+    held = ca.logic_or(ca.logic_or(first, last), ca.logic_or(ca.fabs(step) >= _STEP, ca.fabs(newton - 0.5) >= 0.5))
+    share = ca.if_else(first, 0, ca.if_else(last, 1, clamp(newton, 0, 1)))
+    moves = ca.vertcat(-rates[1:].T / bend, SX.eye(6))  # of the share and the ends by the ends
+    turns = -ca.mtimes([moves.T, bends, moves]) / bend
+    point = SX.sym("point", 3)
+    value, gradient, hessian = _expanded(core.distance_and_normal(point, _ROUNDING)[0], point, start + share * along)
+    by = SX.sym("by", 6)
+    place = share + ca.if_else(held, 0, ca.dot(moves[0, :].T, by) + ca.bilin(turns, by, by) / 2)
+    moved = by[:3] + place * (along + by[3:] - by[:3]) - share * along
+    distance = value + ca.dot(gradient, moved) + ca.bilin(hessian, moved, moved) / 2
+    value, gradient, hessian = _expanded(distance, by, SX.zeros(6))
+    results = ca.cse([value, gradient, ca.triu(hessian, False) + ca.diag(ca.diag(hessian)) / 2])
+    used = [k for k, part in enumerate(parts) if any(ca.depends_on(each, part) for each in results)]
+    options: dict[str, Any] = {
+        "never_inline": True,
+        "is_diff_in": [False] * (2 + len(used)),
+        "is_diff_out": [False] * len(results),
+    }
+    return Function(f"nearest_{kind.__name__}", [start, end, *[parts[k] for k in used]], results, options), used
 
 
 _TABLE: dict[tuple[type[Core], type[Core]], Callable[[Any, Any], SX]] = {

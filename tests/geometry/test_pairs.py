@@ -9,13 +9,22 @@ import pytest
 from numpy.typing import NDArray
 
 from casadi_hands.geometry import pairs
-from casadi_hands.geometry.bodies import KINDS, packed, surfaces, width_of
+from casadi_hands.geometry.bodies import KINDS, Body, packed, surfaces, width_of
+from casadi_hands.geometry.bodies.box import Box
 from casadi_hands.geometry.bodies.capsule import Capsule, Segment
+from casadi_hands.geometry.bodies.convex import Convex
+from casadi_hands.geometry.bodies.cylinder import Cylinder
 from casadi_hands.geometry.bodies.sphere import Point, Sphere
+from casadi_hands.motion.rotation import exponential, rotation_matrix
 from tests.geometry.bodies.checks import along_z, coal_distance
 
 Array = NDArray[np.float64]
 THIN = 1e-6
+BODIES: list[Body] = [
+    Box(np.array([0.1, 0, 0]), np.array([0.8, 0.6, 0.5]), np.array([0.1, 0.2, 0]), 0.02),
+    Cylinder(np.array([0, 0, -0.4]), np.array([0, 0.1, 0.5]), 0.3, 0.05),
+    Convex(np.vstack([0.5 * np.eye(3), -0.4 * np.eye(3)]), 0.05),
+]
 
 
 def segment_to_segment(way: str) -> ca.Function:
@@ -79,19 +88,44 @@ def test_a_point_is_a_segment_of_no_length(rng: np.random.Generator) -> None:
         assert as_point == pytest.approx(float(ca.evalf(pairs.core_distance(one, Segment(at, at)))), abs=1e-6)
 
 
-@pytest.mark.parametrize("way", ["closed", "any"])
-def test_derivatives_are_those_of_differences(way: str) -> None:
+def check_derivatives(value: ca.SX, x: ca.SX, at: Array, h: float, slope_off: float, bend_off: float) -> None:
+    """First and second derivatives against differences over ``h``."""
+    function = ca.Function("f", [x], [value, ca.gradient(value, x), ca.hessian(value, x)[0]])
+    _, gradient, hessian = (np.asarray(found) for found in function(at))
+    ahead, behind = ([function(at + s * h * e) for e in np.eye(len(at))] for s in (1, -1))
+    slopes = [float(a[0] - b[0]) / (2 * h) for a, b in zip(ahead, behind, strict=True)]
+    np.testing.assert_allclose(gradient.ravel(), slopes, atol=slope_off)
+    bends = [np.asarray(a[1] - b[1]).ravel() / (2 * h) for a, b in zip(ahead, behind, strict=True)]
+    np.testing.assert_allclose(hessian, bends, atol=bend_off)
+
+
+def test_derivatives_are_those_of_differences() -> None:
     # Skew, both nearest points inside, where no clamp is at its corner.
     x = ca.SX.sym("x", 12)
-    value = segment_to_segment(way)(x[:3], x[3:6], x[6:9], x[9:])
-    function = ca.Function("f", [x], [value, ca.gradient(value, x), ca.hessian(value, x)[0]])
-    at, h = np.array([-1, 0.1, 0, 1.2, 0, 0.2, 0.3, 0.9, -1, 0.1, 1.1, 1.3]), 1e-6
-    _, gradient, hessian = (np.asarray(found) for found in function(at))
-    ahead, behind = ([function(at + s * h * e) for e in np.eye(12)] for s in (1, -1))
-    slopes = [float(a[0] - b[0]) / (2 * h) for a, b in zip(ahead, behind, strict=True)]
-    np.testing.assert_allclose(gradient.ravel(), slopes, atol=1e-7)
-    bends = [np.asarray(a[1] - b[1]).ravel() / (2 * h) for a, b in zip(ahead, behind, strict=True)]
-    np.testing.assert_allclose(hessian, bends, atol=1e-5)
+    value = segment_to_segment("closed")(x[:3], x[3:6], x[6:9], x[9:])
+    at = np.array([-1, 0.1, 0, 1.2, 0, 0.2, 0.3, 0.9, -1, 0.1, 1.1, 1.3])
+    check_derivatives(value, x, at, 1e-6, 1e-7, 1e-5)
+
+
+@pytest.mark.parametrize("end", [(1.2, 0.9, 0.2), (-0.3, 1.6, 0.4)], ids=["inside", "at an end"])
+@pytest.mark.parametrize("body", BODIES, ids=[body.kind for body in BODIES])
+def test_derivatives_by_a_body_s_pose_and_a_segment_s_ends(body: Body, end: tuple[float, ...]) -> None:
+    """All that finds the nearest points is constant to derivatives, which are there all the same."""
+    x = ca.SX.sym("x", 12)
+    turn = rotation_matrix(exponential(x[6:9]))
+    surface = surfaces((type(body),), ca.SX(body.parameters))[0].mapped(lambda p: x[9:] + ca.mtimes(turn, p))
+    value = pairs.core_distance(Segment(x[:3], x[3:6]), surface.core)
+    at = np.array([-1.1, 1.2, 0.3, *end, 0.2, -0.3, 0.4, 0.1, -0.2, 0.05])
+    check_derivatives(value, x, at, 1e-5, 1e-4, 1e-2)
+
+
+def test_what_finds_the_nearest_points_is_called_once() -> None:
+    """Derivatives of a distance compute none of it again: else they grow with a body's faces and all variables."""
+    x, body = ca.SX.sym("x", 6), BODIES[-1]
+    core = surfaces((type(body),), ca.SX(body.parameters))[0].core
+    value = pairs.core_distance(Segment(x[:3], x[3:]), core)
+    found = ca.Function("f", [x], [value, ca.gradient(value, x), ca.hessian(value, x)[0]])
+    assert found.str(True).count("= nearest_") == 1
 
 
 def test_bodies_in_one_column_are_told_apart(rng: np.random.Generator) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Self
 
@@ -21,10 +21,15 @@ _CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
 @dataclass(frozen=True)
 class Block(Core):
-    """A solid box about a centre (3,), with the vectors (3,) from there to the middles of three faces."""
+    """A solid box about a centre (3,), with the vectors from there to the middles of three faces, columns of (3, 3)."""
 
     center: SX
-    arms: tuple[SX, SX, SX]
+    sides: SX
+
+    @property
+    def arms(self) -> list[SX]:
+        """Its vectors (3,) to the middles of faces."""
+        return list(ca.horzsplit(self.sides))
 
     def _shares(self, point: SX) -> list[SX]:
         """How far a point is along each arm, one at its end."""
@@ -43,12 +48,6 @@ class Block(Core):
         for share, arm in zip(self._shares(point), self.arms, strict=True):
             outside = ca.fmax(outside, (ca.fabs(share) - 1) * norm(arm))
         return ca.fmax(-outside, 0)
-
-    def mapped(self, placed: Callable[[SX], SX]) -> Block:
-        """See `Core`."""
-        center = placed(self.center)
-        x, y, z = (placed(self.center + arm) - center for arm in self.arms)
-        return Block(center, (x, y, z))
 
     def marks(self, up: SX) -> list[SX]:
         """See `Core`: the corners, and what is lowest."""
@@ -122,8 +121,8 @@ class Box(Body):
         """See `Body`."""
         edge = parameters[12]
         arms = [parameters[3 + 3 * k : 6 + 3 * k] for k in range(3)]
-        x, y, z = (arm - edge * arm / norm(arm) for arm in arms)
-        return Surface(Block(parameters[:3], (x, y, z)), edge)
+        inner = [arm - edge * arm / norm(arm) for arm in arms]
+        return Surface(Block(parameters[:3], ca.horzcat(*inner)), edge)
 
     @property
     def helper(self) -> Array:

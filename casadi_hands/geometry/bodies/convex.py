@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache, cached_property
 from typing import Any, ClassVar
 
@@ -37,16 +37,12 @@ class Facets(Core):
         reaches: (F, 1) of the faces' planes along them, moved so that the surface goes through the faces' middles.
         corners: (V, 3) of the core.
         edge: radius of the rounded edges.
-        origin: (3,) of the body's frame in this one.
-        turn: (3, 3) this frame from the body's.
     """
 
     normals: SX
     reaches: SX
     corners: SX
     edge: SX
-    origin: SX
-    turn: SX
 
     def _weighed(self, beyond: SX) -> tuple[SX, SX, SX]:
         """Of how far a point is beyond the faces (F, 1): the most, weights (F, 1) of the nearest, and their sum."""
@@ -56,19 +52,19 @@ class Facets(Core):
 
     def _beyond(self, point: SX) -> SX:
         """How far a point (3,) is beyond the faces (F, 1)."""
-        return ca.mtimes(self.normals, ca.mtimes(self.turn.T, point - self.origin)) - self.reaches
+        return ca.mtimes(self.normals, point) - self.reaches
 
     def distance_and_normal(self, point: SX, rounding: float) -> tuple[SX, SX]:
         """See `Core`; outside, the distance of a plane that is as steep as the nearest faces are together."""
         most, weights, total = self._weighed(self._beyond(point))
         beyond = most + ca.log(total) * self.edge / _SHARPNESS
-        mean = ca.mtimes(self.turn, ca.mtimes(self.normals.T, weights) / total)
+        mean = ca.mtimes(self.normals.T, weights) / total
         steep = norm(mean, 1e-6)
         return ca.if_else(beyond > 0, beyond / steep, beyond) + self.edge, mean / steep
 
     def slopes(self, start: SX, along: SX) -> Callable[[SX], SX]:
         """See `Core`."""
-        first, change = self._beyond(start), ca.mtimes(self.normals, ca.mtimes(self.turn.T, along))
+        first, change = self._beyond(start), ca.mtimes(self.normals, along)
 
         def slope(share: SX) -> SX:
             _, weights, total = self._weighed(first + share * change)
@@ -81,21 +77,15 @@ class Facets(Core):
         distance, normal = self.distance_and_normal(point, 0.0)
         return distance * normal
 
-    def mapped(self, placed: Callable[[SX], SX]) -> Facets:
-        """See `Core`."""
-        origin = placed(self.origin)
-        axes = [placed(self.origin + self.turn[:, k]) - origin for k in range(3)]
-        return replace(self, origin=origin, turn=ca.horzcat(*axes))
-
     def marks(self, up: SX) -> list[SX]:
         """See `Core`: the lowest."""
         return self.lowest(up)
 
     def lowest(self, up: SX) -> list[SX]:
         """See `Core`: a corner; the middle of the corners that are level."""
-        heights = ca.mtimes(self.corners, ca.mtimes(self.turn.T, up))
+        heights = ca.mtimes(self.corners, up)
         weights = ca.exp((constant(ca.mmin(heights)) - heights) / _LOWEST)
-        return [self.origin + ca.mtimes(self.turn, ca.mtimes(self.corners.T, weights) / ca.sum1(weights))]
+        return [ca.mtimes(self.corners.T, weights) / ca.sum1(weights)]
 
 
 def _edge(data: Mapping[str, Any]) -> float:
@@ -161,7 +151,7 @@ class Convex(Body):
         normals, reaches, points = (parameters[a:b] for a, b in itertools.pairwise(ends))
         rows = [ca.reshape(each, 3, -1).T for each in (normals, points)]
         edge = parameters[ends[-1]]
-        return Surface(Facets(rows[0], reaches, rows[1], edge, SX.zeros(3, 1), SX.eye(3)), edge)
+        return Surface(Facets(rows[0], reaches, rows[1], edge), edge)
 
     @cached_property
     def _reaches(self) -> Array:

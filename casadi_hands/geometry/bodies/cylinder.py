@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Self
 
@@ -45,10 +45,6 @@ class Drum(Core):
         share, along, _, far = self._parts(point)
         outside = ca.fmax(ca.fmax(-share, share - 1) * norm(along), far - self.radius)
         return ca.fmax(-outside, 0)
-
-    def mapped(self, placed: Callable[[SX], SX]) -> Drum:
-        """See `Core`."""
-        return Drum(placed(self.start), placed(self.end), self.radius)
 
     def marks(self, up: SX) -> list[SX]:
         """See `Core`: of both faces and between them the middle and the lowest point."""
