@@ -1,4 +1,4 @@
-"""How far a judged design is from what is aimed at."""
+"""How far a judged design is from what is aimed at, and what may be nearer."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 from casadi_hands.export.design import Design
 
 AIM = 3.0  # deg from any goal in the replay as planned, beyond which more is tried
+NEARLY = 0.1  # of the replays: where no more drop the object, a grip in between may do
 
 
 def rank_of(design: Design) -> tuple[float, ...]:
@@ -27,3 +28,14 @@ def rank_of(design: Design) -> tuple[float, ...]:
 def _motors(design: Design) -> float:
     """How many motors share the joints: fewer than these is what was asked for."""
     return math.inf if design.hand is None or design.hand.drive is None else design.hand.motors
+
+
+def _nearly(design: Design) -> bool:
+    """Whether all that a design misses is that a few replays fewer should drop the object."""
+    dropped = design.certificate.get("replay_dropped", {}).get("value") or 0.0
+    return design.missed == {"replay_dropped"} and dropped <= NEARLY
+
+
+def in_between(one: Design, other: Design) -> bool:
+    """Whether a grip between two may do: one of these nearly does, or each keeps the limits that the other misses."""
+    return _nearly(one) or _nearly(other) or not one.missed & other.missed

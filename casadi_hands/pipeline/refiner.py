@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -15,7 +16,7 @@ from casadi_hands.export.design import Design
 from casadi_hands.pipeline.halving import BETWEEN, excess, intervals_to_halve
 from casadi_hands.pipeline.judge import STRAINED, Judge
 from casadi_hands.pipeline.margins import SMALL, margins_for
-from casadi_hands.pipeline.rank import AIM, rank_of
+from casadi_hands.pipeline.rank import AIM, in_between, rank_of
 from casadi_hands.pipeline.record import Record
 from casadi_hands.pipeline.steps import adopt
 from casadi_hands.problem.hand_motion import WholeHand
@@ -33,7 +34,6 @@ Array = NDArray[np.float64]
 BORNE = {"bearing_moment", "link_stress", "tip_deflection"}
 Tried = tuple[Design, Refined, Continuation]  # judged, what it was made of, and found with
 HARDLY = 0.3  # of the joints' stiffness: a grasp that asks for more is lost where joints are a little softer
-NEARLY = 0.1  # of the replays: where no more drop the object, a grip in between may do
 GAIN = 0.8  # of how far limits are missed, that more samples must reach to be worth still more
 
 
@@ -72,7 +72,8 @@ class Refiner:
             margin: the first to be tried; by default what suits the hand.
             near: whether the motion is nearly exact already.
             homotopy: the homotopy parameter that its motion goes to: 1 at its goals.
-            grips: whether other grips are tried where replays fail.
+            grips: whether other grips are tried where the audit refuses it or replays fail; else little time is spent
+                on it, as on a hand that only takes the place of a certified one.
 
         Returns:
             the design, replayed where its files hold, and its refinement.
@@ -81,9 +82,9 @@ class Refiner:
         margin, largest = margin or margins.ample, margins.larger
         refined, stage = self._exact(whole, margin, near, homotopy, largest)
         judged, refined, stage = self._borne(
-            whole, self._between(whole, refined, stage, short, planned), short, planned
+            whole, self._between(whole, refined, stage, short, planned, most=None if grips else 1), short, planned
         )
-        if refined.exact and judged.status != "certified" and not stage.passes_through(refined):
+        if grips and refined.exact and judged.status != "certified" and not stage.passes_through(refined):
             # Where joints barely push, fingers may fold over in an instant: other forces take them another way.
             margin, which = (margins.ample, "smaller") if refined.margin == largest else (largest, "larger")
             if judged.missed & {"least_stiffness", "torque", *BORNE}:  # which ask for less, the less fingers press
@@ -115,7 +116,7 @@ class Refiner:
                 break
             self.record.log("refine", f"not with a {which} grip: {design.reason}")
             worse = bool(judged.missed & design.missed) and (design.drops or 0) > (judged.drops or 0)
-            if held.status == "certified" and not worse and not _in_between(judged, design):
+            if held.status == "certified" and not worse and not in_between(judged, design):
                 break
             another, which = other_way if worse else between
         return best
@@ -139,12 +140,20 @@ class Refiner:
         return sliding if sliding[0].misses_less_than(rolling[0]) else rolling
 
     def _between(
-        self, whole: WholeHand, refined: Refined, stage: Continuation, short: tuple[Reason, ...], planned: Design
+        self,
+        whole: WholeHand,
+        refined: Refined,
+        stage: Continuation,
+        short: tuple[Reason, ...],
+        planned: Design,
+        most: int | None = None,
     ) -> Tried:
-        """Judge a refinement; where it is exact but between samples, halve intervals as long as that helps."""
+        """Judge a refinement; where it is exact but between samples, halve intervals ``most`` times while that helps."""
         judged = self._judged(stage.model, refined, short, planned)
-        # Fingers that pass through each other do so on any knots.
-        while refined.exact and judged.missed & BETWEEN and not stage.passes_through(refined):
+        for _ in itertools.count() if most is None else range(most):
+            # Fingers that pass through each other do so on any knots.
+            if not refined.exact or not judged.missed & BETWEEN or stage.passes_through(refined):
+                break
             schedule = stage.model.schedule
             found = self.judge.audited(judged)
             crowded = intervals_to_halve(found, np.diff(schedule.samples), partial(without_holds, schedule))
@@ -167,7 +176,9 @@ class Refiner:
         judged, refined, stage = found
         task, model = self.record.task, stage.model
         least = min(getattr(task.limits, name) for name in BORNE)
-        if not refined.exact or not judged.missed & BORNE or model.strength or least == 0:
+        # Other forces lower what joints must bear and hold; bodies that overlap still do.
+        others = judged.missed - judged.missed_in_replays - BORNE - {"least_stiffness", "torque"}
+        if not refined.exact or not judged.missed & BORNE or others or model.strength or least == 0:
             return found
         held = replace(model, strength=Strength.of(task, model.units))
         strong = Continuation(held, stage.contacts, stage.joints, stage.active)
@@ -281,14 +292,3 @@ class Refiner:
             design = self.judge.replayed(design, self.jobs)
         self.record.update_best(design)
         return design
-
-
-def _nearly(design: Design) -> bool:
-    """Whether all that a design misses is that a few replays fewer should drop the object."""
-    dropped = design.certificate.get("replay_dropped", {}).get("value") or 0.0
-    return design.missed == {"replay_dropped"} and dropped <= NEARLY
-
-
-def _in_between(one: Design, other: Design) -> bool:
-    """Whether a grip between two may do: one of these nearly does, or each keeps the limits that the other misses."""
-    return _nearly(one) or _nearly(other) or not one.missed & other.missed
