@@ -148,7 +148,7 @@ class Refiner:
         planned: Design,
         most: int | None = None,
     ) -> Tried:
-        """Judge a refinement; where it is exact but between samples, halve intervals ``most`` times while that helps."""
+        """Judge a refinement; where it is exact but between samples, halve intervals while it helps, ``most`` times."""
         judged = self._judged(stage.model, refined, short, planned)
         for _ in itertools.count() if most is None else range(most):
             # Fingers that pass through each other do so on any knots.

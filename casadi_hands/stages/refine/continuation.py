@@ -30,6 +30,7 @@ from casadi_hands.stages.refine.settings import (
     NEARBY_STEPS,
     RENEWED_STEPS,
     SHARP,
+    SHARPENED_STEPS,
     STIFF_PENALTY,
     Step,
 )
