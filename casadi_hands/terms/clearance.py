@@ -40,21 +40,24 @@ def overlap(depth: SX) -> SX:
     return penalty_spline(depth, _ROUNDING)
 
 
-def links_and_object(ends: list[tuple[SX, SX]], radii: Sequence[SX], bodies: Sequence[Surface]) -> SX:
+def links_and_object(
+    ends: list[tuple[SX, SX]], radii: Sequence[SX], bodies: Sequence[Surface], margin: SX | None = None
+) -> SX:
     """Distances (L·K,) between the surfaces of a finger's links and the object's bodies.
 
     Args:
         ends: both ends (3,) of each link's axis.
         radii: of the links.
         bodies: whose union the object is.
+        margin: what costs nothing beyond; where it is given, distances of what is farther may be any that are more.
     """
-    return ca.vertcat(
-        *[
-            core_distance(Segment(start, end), body.core) - radius - body.radius
-            for (start, end), radius in zip(ends, radii, strict=True)
-            for body in bodies
-        ]
-    )
+    found = []
+    for (start, end), radius in zip(ends, radii, strict=True):
+        for body in bodies:
+            radii_of_both = radius + body.radius
+            enough = None if margin is None else margin + radii_of_both + _ROUNDING
+            found.append(core_distance(Segment(start, end), body.core, enough) - radii_of_both)
+    return ca.vertcat(*found)
 
 
 def links_and_palm(ends: list[tuple[SX, SX]], radii: Sequence[SX], palm_radius: SX) -> SX:

@@ -119,6 +119,26 @@ def test_derivatives_by_a_body_s_pose_and_a_segment_s_ends(body: Body, end: tupl
     check_derivatives(value, x, at, 1e-5, 1e-4, 1e-2)
 
 
+def test_what_is_farther_than_enough_need_not_be_found(rng: np.random.Generator) -> None:
+    """Nearer, with derivatives, it is what it would be anyway; else it is more than that, and as flat as can be."""
+    x, body, enough = ca.SX.sym("x", 6), BODIES[-1], 0.4
+    core = surfaces((type(body),), ca.SX(body.parameters))[0].core
+    found = []
+    for limit in (None, ca.SX(enough)):
+        value = pairs.core_distance(Segment(x[:3], x[3:]), core, limit)
+        derivatives = ca.gradient(value, x), ca.densify(ca.hessian(value, x)[0])
+        found.append(ca.Function("f", [x], [value, *derivatives]))
+    near = 0
+    for at in rng.normal(size=(200, 6)):
+        exact, either = ([np.asarray(each) for each in function(at)] for function in found)
+        if exact[0] < enough:
+            near += 1
+            assert [a.tolist() for a in either] == [a.tolist() for a in exact]
+        else:
+            assert either[0] >= enough
+    assert 20 < near < 180
+
+
 def test_what_finds_the_nearest_points_is_called_once() -> None:
     """Derivatives of a distance compute none of it again: else they grow with a body's faces and all variables."""
     x, body = ca.SX.sym("x", 6), BODIES[-1]

@@ -72,6 +72,10 @@ class Core(ABC):
         """How deep a point is within the core, zero outside: what its distance is continued by there."""
         return SX(0)
 
+    def ball(self) -> tuple[SX, SX] | None:
+        """Centre (3,) and radius of a ball that holds it; None where its distances are found as soon as the ball's."""
+        return None
+
     def distance_and_normal(self, point: SX, rounding: float) -> tuple[SX, SX]:
         """Signed distance of a point (3,) from the core, and the outward unit normal (3,) nearest to it.
 

@@ -72,6 +72,11 @@ class Facets(Core):
 
         return slope
 
+    def ball(self) -> tuple[SX, SX]:
+        """See `Core`."""
+        center = ca.sum1(self.corners).T / self.corners.shape[0]
+        return center, ca.mmax(ca.sqrt(ca.sum2((self.corners - ca.repmat(center.T, self.corners.shape[0], 1)) ** 2)))
+
     def offset(self, point: SX) -> SX:
         """See `Core`."""
         distance, normal = self.distance_and_normal(point, 0.0)

@@ -81,11 +81,12 @@ def collide(joints: int, kinds: tuple[type[Body], ...], servos: bool = False) ->
         clearance.links_of_one(ends, radii),
     ]
     if joints > 1:
-        apart.append(clearance.links_and_object(ends[:-1], radii[:-1], bodies))
+        apart.append(clearance.links_and_object(ends[:-1], radii[:-1], bodies, margin))
     if servos:
         servo = kernel.parameter("servo_radius")
         apart.append(clearance.servos_and_rest(ends, radii, servo, palm_radius, bodies, up, ground))
-    touching, folds = clearance.links_and_object(ends[-1:], radii[-1:], bodies), clearance.unfolded(ends, radius)
+    touching = clearance.links_and_object(ends[-1:], radii[-1:], bodies, ca.SX(0))
+    folds = clearance.unfolded(ends, radius)
     kernel.cost(clearance.COLLISION, clearance.overlap(ca.vertcat(margin - ca.vertcat(*apart), -touching, -folds)))
     return kernel
 

@@ -98,7 +98,7 @@ def object_clearance(joints: int, kinds: tuple[type[Body], ...], moves: bool, se
     here = symbols.placed(angles, (radius, tip_radius))
     up = palm.turned(SX([0, 0, 1]))
     servo = kernel.parameter("servo_radius") if servos else None
-    apart, touching = distances(here, palm_radius, in_palm, up, ground - palm.position[2], servo)
+    apart, touching = distances(here, palm_radius, in_palm, up, ground - palm.position[2], servo, margin)
     folds = clearance.unfolded(here.ends, radius)
     kernel.cost(clearance.COLLISION, clearance.overlap(ca.vertcat(margin - apart, -touching, -folds)))
     return kernel
@@ -111,20 +111,23 @@ def distances(
     up: SX | None,
     ground: SX,
     servo: SX | None = None,
+    margin: SX | None = None,
 ) -> tuple[SX, SX]:
     """Distances between one finger and all but other fingers: those to keep apart, and the touching link's (K,).
 
     Without a ground ``up`` is None, and so is ``servo``, the radius of a joint's ball with its servo, without these.
+    Where there is a ``margin``, distances from the object need only be right up to it, and the touching link's up to 0.
     """
     ends, radii = here.links
     apart = [clearance.links_and_palm(ends, radii, palm_radius), clearance.links_of_one(ends, radii)]
     if up is not None:
         apart.append(clearance.links_and_ground(ends, radii, up, ground))
     if len(ends) > 1:
-        apart.append(clearance.links_and_object(ends[:-1], radii[:-1], bodies))
+        apart.append(clearance.links_and_object(ends[:-1], radii[:-1], bodies, margin))
     if servo is not None:
         apart.append(clearance.servos_and_rest(ends, radii, servo, palm_radius, bodies, up, ground))
-    return ca.vertcat(*apart), clearance.links_and_object(ends[-1:], radii[-1:], bodies)
+    touching = clearance.links_and_object(ends[-1:], radii[-1:], bodies, None if margin is None else SX(0))
+    return ca.vertcat(*apart), touching
 
 
 @cache
