@@ -30,7 +30,6 @@ from casadi_hands.stages.refine.settings import (
     NEARBY_STEPS,
     RENEWED_STEPS,
     SHARP,
-    SHARPENED_STEPS,
     STIFF_PENALTY,
     Step,
 )
@@ -137,7 +136,7 @@ class Continuation:
             sharpness: how many times it has been sharpened then, at most ``sharpest``.
             margin: to keep to the limits.
         """
-        sharp = self.fine.take(SHARPENED_STEPS, exact.hand, margin, sharpness=sharpness)
+        sharp = self.fine.take(LAST_STEP, exact.hand, margin, sharpness=sharpness)
         return replace(sharp, barely_rolls=exact.barely_rolls, sharpness=sharpness)
 
     def with_margin(self, exact: Refined, margin: Margin) -> Refined:

@@ -59,8 +59,6 @@ COUPLING_STEPS: tuple[Step, ...] = (
 # To such a one from a motion that is not exact.
 COUPLING_FROM_AFAR: tuple[Step, ...] = (ALL_STEPS[0], *COUPLING_STEPS)
 LAST_STEP: tuple[Step, ...] = NEARBY_STEPS[-1:]
-# To one that resists slow spins, too: sharp bends make the best one slow to find, and a good one does.
-SHARPENED_STEPS: tuple[Step, ...] = (("hard constraints", WEIGHTS | HARD, replace(HARD_CONSTRAINTS, max_iter=100)),)
 # Of the slip with which friction is on its cone: with penalties, and of hard constraints one after another from there.
 VISCOUS = 100.0
 SHARPER = (VISCOUS, 30.0, 10.0, 3.0, 1.0)
