@@ -39,6 +39,7 @@ def _segment_and_core(one: Segment, other: Core, enough: SX | None = None) -> SX
     start, end, core = one.start, one.end, other
     if isinstance(other, Placed):
         start, end, core = other.own(one.start), other.own(one.end), other.core
+    core = core.for_links()
     parts = list(vars(core).values())  # its fields
     nearest, used = _nearest(type(core), tuple(part.shape for part in parts))
     here = constant(start), constant(end)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
+from casadi_hands.geometry.bodies import Body
 from casadi_hands.task.fields import Vector, vector
 from casadi_hands.task.motion import Goal
 from casadi_hands.task.object import ManipulatedObject
@@ -13,6 +15,7 @@ from casadi_hands.task.on_joint import placed
 from casadi_hands.task.problem import Problem
 from casadi_hands.task.task import Task
 
+Array = NDArray[np.float64]
 # Share of the characteristic length within which a contact is moved onto the surface without a word.
 CONTACT_TOLERANCE = 0.2
 # The same within which contacts that were moved are in one place.
@@ -20,6 +23,10 @@ _TOGETHER = 1e-3
 # Of the characteristic length; shorter lengths are rounding: nothing is moved for them, so that normalising a task
 # twice, or saving and loading it, leaves it equal to the last digit.
 _ROUNDING = 1e-12
+_OFF = 1e-6  # of the characteristic length, within which a point is on a surface
+_ABOVE = 0.05  # of it, radius of a ball that is to rest on a point without being in other bodies, but for so little
+_FLUSH = 0.95
+_AWAY, _WAYS = (1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1), 24  # of it, and in how many directions: looked at for a face
 
 
 def normalise(task: Task) -> tuple[Task, list[Problem]]:
@@ -71,11 +78,38 @@ def _snap(point: Vector, body: ManipulatedObject, path: tuple[str | int, ...], p
         return point
     snapped = start if distance <= _ROUNDING * size else shape.body.on_surface(start)
     for number, other in enumerate(body.shapes):
-        if other is not shape and other.body.signed_distance(snapped) < -1e-6 * size:
+        if other is not shape and other.body.signed_distance(snapped) < -_OFF * size:
             allowed = f"a point on the outside of the object; this one lies inside object.shapes[{number}]"
             problems.append(Problem(path, given, allowed))
             return point
-    return vector(snapped)
+    others = [other.body for other in body.shapes if other is not shape]
+    return vector(_off_seam(snapped, shape.body, others, size))
+
+
+def _off_seam(point: Array, body: Body, others: Sequence[Body], size: float) -> Array:
+    """A point (3,) or, where its body has an edge that is inside of another, the nearest one off that edge.
+
+    Convex parts of a mesh meet in such seams, where the surface goes on as if there was none.
+    """
+    above = _ABOVE * size
+
+    def clear(at: Array) -> bool:
+        return all(other.signed_distance(at + above * body.outward(at)) > _FLUSH * above for other in others)
+
+    normals, most = body.face(point)
+    over = point + above * normals[normals @ point > most]  # beyond the edges that it is next to
+    in_seam = any(other.signed_distance(at) < 0 for other in others for at in over)
+    if not body.face_bounds or (clear(point) and not in_seam):
+        return point
+    across = np.linalg.svd(body.outward(point)[None])[2][1:]
+    for way in _AWAY:
+        for turn in 2 * np.pi * np.arange(_WAYS) / _WAYS:
+            at = body.on_surface(point + way * size * np.array([np.cos(turn), np.sin(turn)]) @ across)
+            normals, most = body.face(at)
+            outside = all(other.signed_distance(at) > -_OFF * size for other in others)
+            if outside and clear(at) and np.all(normals @ at <= most) and abs(body.signed_distance(at)) < _OFF * size:
+                return at
+    return point
 
 
 def _together(task: Task, moved: dict[str, Vector]) -> Iterator[Problem]:

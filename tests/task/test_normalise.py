@@ -59,3 +59,41 @@ def test_saving_and_loading_changes_nothing() -> None:
     again = parse_task(task_to_yaml(task))
     assert again == task
     assert task_to_yaml(again) == task_to_yaml(task)
+
+
+SPLIT = """\
+object:
+  mass: 0.1
+  shapes:
+    - box: {center: [-0.02, 0, 0], size: [0.04, 0.03, 0.03]}
+    - SECOND
+palm: {position: [0, 0, 0.1], facing: [0, 0, -1]}
+motion: [{at: 0, position: [0, 0, 0]}, {at: 2, position: [0, 0, 0.01]}]
+fingers:
+  thumb: {touches: [0, 0.015, 0.001]}
+  index: {touches: [0.0001, -0.015, 0.001]}
+  middle: {touches: [-0.0001, 0.002, -0.015]}
+"""
+BLOCK = "box: {center: [0.02, 0, 0], size: [0.04, 0.03, 0.03]}"
+CORNERS = [[x, y, z] for x in (0.0, 0.04) for y in (-0.015, 0.015) for z in (-0.015, 0.015)]
+
+
+@pytest.mark.parametrize("second", [BLOCK, f"convex: {{vertices: {CORNERS}}}"], ids=["box", "polytope"])
+def test_where_two_parts_meet_a_contact_is_on_a_face_of_one(second: str) -> None:
+    """The seam is an edge of both, and none of the object: whichever part is touched, its normal there is the face's."""
+    task = parse_task(SPLIT.replace("SECOND", second))
+    given = np.array([[0, 0.015, 0.001], [0.0001, -0.015, 0.001], [-0.0001, 0.002, -0.015]])
+    outward = [[0, 1, 0], [0, -1, 0], [0, 0, -1]]
+    for finger, before, normal in zip(task.fingers.values(), given, outward, strict=True):
+        point = np.array(finger.touches)
+        body = min((shape.body for shape in task.object.shapes), key=lambda each: abs(each.signed_distance(point)))
+        assert body.outward(point) == pytest.approx(np.array(normal), abs=5e-3)
+        assert np.linalg.norm(point - before) < 1e-3  # the solid's middle is the frame's
+    assert parse_task(task_to_yaml(task)) == task
+
+
+def test_an_edge_of_the_object_stays_where_a_person_put_a_contact() -> None:
+    given = SPLIT.replace("SECOND", BLOCK).replace("[0, 0.015, 0.001]", "[0.01, 0.015, 0.015]")
+    task = parse_task(given)
+    body, point = task.object.shapes[1].body, np.array(task.fingers["thumb"].touches)
+    assert body.outward(point) == pytest.approx(np.array([0, 1, 1]) / np.sqrt(2), abs=1e-6)

@@ -72,6 +72,10 @@ class Core(ABC):
         """How deep a point is within the core, zero outside: what its distance is continued by there."""
         return SX(0)
 
+    def for_links(self) -> Core:
+        """What distances from links are measured to, where that is another core than contacts roll on."""
+        return self
+
     def ball(self) -> tuple[SX, SX] | None:
         """Centre (3,) and radius of a ball that holds it; None where its distances are found as soon as the ball's."""
         return None

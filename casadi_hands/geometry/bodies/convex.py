@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from typing import Any, ClassVar
@@ -14,83 +14,14 @@ import numpy as np
 from casadi import SX
 from scipy.spatial import QhullError
 
-from casadi_hands.geometry.bodies.body import TILT, Array, Body, Core, Solid, Surface, edge_metadata, farthest
+from casadi_hands.geometry.bodies.body import TILT, Array, Body, Solid, Surface, edge_metadata, farthest
+from casadi_hands.geometry.facets import SHARPNESS, Facets
 from casadi_hands.geometry.hull import ALIKE, Hull, crossed, hull_of, mass_moments, within
-from casadi_hands.geometry.smooth import constant, norm
 
-# The surface is where log Σ exp β(n·x - d) vanishes; with this β times its edges' radius, square edges are as far
-# inside those of the faces as round ones of that radius would be.
-_SHARPNESS = float(np.sqrt(2) * np.log(2) / (np.sqrt(2) - 1))
-_LOWEST = 1e-3  # lengths by which corners may be higher than the lowest and count for it
 _STEPS = 1000  # towards the surface; in a sharp wedge they zigzag
 _MOST_BOUNDS = 8  # of a face, those nearest to a point
 _SHARP = np.cos(np.radians(30.01))  # of the angle between faces: contacts may roll over blunter edges
 _ROUNDS = 30  # of moving faces until the surface goes through their middles
-
-
-@dataclass(frozen=True)
-class Facets(Core):
-    """What is inside of all faces.
-
-    Attributes:
-        normals: (F, 3) outward, in the frame of the body.
-        reaches: (F, 1) of the faces' planes along them, moved so that the surface goes through the faces' middles.
-        corners: (V, 3) of the core.
-        edge: radius of the rounded edges.
-    """
-
-    normals: SX
-    reaches: SX
-    corners: SX
-    edge: SX
-
-    def _weighed(self, beyond: SX) -> tuple[SX, SX, SX]:
-        """Of how far a point is beyond the faces (F, 1): the most, weights (F, 1) of the nearest, and their sum."""
-        most = constant(ca.mmax(beyond))
-        weights = ca.exp(_SHARPNESS / self.edge * (beyond - most))
-        return most, weights, ca.sum1(weights)
-
-    def _beyond(self, point: SX) -> SX:
-        """How far a point (3,) is beyond the faces (F, 1)."""
-        return ca.mtimes(self.normals, point) - self.reaches
-
-    def distance_and_normal(self, point: SX, rounding: float) -> tuple[SX, SX]:
-        """See `Core`; outside, the distance of a plane that is as steep as the nearest faces are together."""
-        most, weights, total = self._weighed(self._beyond(point))
-        beyond = most + ca.log(total) * self.edge / _SHARPNESS
-        mean = ca.mtimes(self.normals.T, weights) / total
-        steep = norm(mean, 1e-6)
-        return ca.if_else(beyond > 0, beyond / steep, beyond) + self.edge, mean / steep
-
-    def slopes(self, start: SX, along: SX) -> Callable[[SX], SX]:
-        """See `Core`."""
-        first, change = self._beyond(start), ca.mtimes(self.normals, along)
-
-        def slope(share: SX) -> SX:
-            _, weights, total = self._weighed(first + share * change)
-            return ca.dot(weights, change) / total
-
-        return slope
-
-    def ball(self) -> tuple[SX, SX]:
-        """See `Core`."""
-        center = ca.sum1(self.corners).T / self.corners.shape[0]
-        return center, ca.mmax(ca.sqrt(ca.sum2((self.corners - ca.repmat(center.T, self.corners.shape[0], 1)) ** 2)))
-
-    def offset(self, point: SX) -> SX:
-        """See `Core`."""
-        distance, normal = self.distance_and_normal(point, 0.0)
-        return distance * normal
-
-    def marks(self, up: SX) -> list[SX]:
-        """See `Core`: the lowest."""
-        return self.lowest(up)
-
-    def lowest(self, up: SX) -> list[SX]:
-        """See `Core`: a corner; the middle of the corners that are level."""
-        heights = ca.mtimes(self.corners, up)
-        weights = ca.exp((constant(ca.mmin(heights)) - heights) / _LOWEST)
-        return [ca.mtimes(self.corners.T, weights) / ca.sum1(weights)]
 
 
 def _edge(data: Mapping[str, Any]) -> float:
@@ -108,12 +39,12 @@ class Convex(Body):
     """The least polytope about some points.
 
     Attributes:
-        counts: of faces, and of corners of the core; like ``width``, classes that `_of_counts` makes have it.
+        counts: of faces, corners of the core, and bevels; like ``width``, classes that `_of_counts` makes have it.
     """
 
     kind: ClassVar[str] = "convex"
     face_bounds: ClassVar[int] = _MOST_BOUNDS
-    counts: ClassVar[tuple[int, int]]
+    counts: ClassVar[tuple[int, int, int]]
     _hull: ClassVar[Any]  # of each body a `Hull`, or None where there is none, and no field
     _core: ClassVar[Any]  # likewise
     vertices: Array = field(metadata={"about": "Its corners, m, object frame; a list of four or more.", "is": "points"})
@@ -144,19 +75,20 @@ class Convex(Body):
 
     @property
     def parameters(self) -> Array:
-        """See `Body`: faces' normals and reaches, corners of the core, edge radius."""
+        """See `Body`: normals of faces and bevels, their reaches, corners of the core, edge radius."""
         hull = self._hull
-        return np.concatenate([hull.normals.ravel(), self._reaches, self._core.corners.ravel(), [self.edge_radius]])
+        planes = [hull.normals.ravel(), self._reaches, hull.bevels.ravel(), hull.bevel_reaches]
+        return np.concatenate([*planes, self._core.corners.ravel(), [self.edge_radius]])
 
     @classmethod
     def surface(cls, parameters: SX) -> Surface:
         """See `Body`."""
-        faces, corners = cls.counts
-        ends = np.cumsum([0, 3 * faces, faces, 3 * corners]).tolist()
-        normals, reaches, points = (parameters[a:b] for a, b in itertools.pairwise(ends))
-        rows = [ca.reshape(each, 3, -1).T for each in (normals, points)]
+        faces, corners, bevels = cls.counts
+        ends = np.cumsum([0, 3 * faces, faces, 3 * bevels, bevels, 3 * corners]).tolist()
+        found = [parameters[a:b] for a, b in itertools.pairwise(ends)]
+        normals, sloping, points = (ca.reshape(each, 3, -1).T for each in found[::2])
         edge = parameters[ends[-1]]
-        return Surface(Facets(rows[0], reaches, rows[1], edge), edge)
+        return Surface(Facets(normals, found[1], points, edge, sloping, found[3]), edge)
 
     @cached_property
     def _reaches(self) -> Array:
@@ -177,7 +109,7 @@ class Convex(Body):
 
     def _chosen(self, points: Array, reaches: Array | None = None) -> tuple[Array, Array]:
         """How far points (..., 3) are outside, softly, and mean normals (..., 3) of the faces nearest to them."""
-        sharpness = _SHARPNESS / self.edge_radius
+        sharpness = SHARPNESS / self.edge_radius
         beyond = points @ self._hull.normals.T - (self._reaches if reaches is None else reaches)
         most = beyond.max(axis=-1, keepdims=True)
         weights = np.exp(sharpness * (beyond - most))
@@ -233,7 +165,7 @@ class Convex(Body):
         sharp = np.flatnonzero(((on[:, [own]] & on).sum(axis=0) >= 2) & (cosines < _SHARP))
         nearest = sharp[np.argsort(-beyond[sharp] / sines[sharp], kind="stable")[:_MOST_BOUNDS]]
         # So far within the next face's plane its share in the mean normal turns that by no more.
-        off = -np.log(TILT) * self.edge_radius / _SHARPNESS
+        off = -np.log(TILT) * self.edge_radius / SHARPNESS
         return hull.normals[nearest], hull.reaches[nearest] - off
 
     def support(self, direction: Array) -> Array:
@@ -282,14 +214,16 @@ class Convex(Body):
 
 def _of_hulls(vertices: Array, edge_radius: float, hull: Hull | None, core: Hull | None) -> Convex:
     """The body of some points whose hull and core are known; None of those that there are none of."""
-    made = object.__new__(_of_counts(len(hull.normals), len(core.corners)) if hull and core else Convex)
+    counts = (len(hull.normals), len(core.corners), len(hull.bevels)) if hull and core else None
+    made = object.__new__(_of_counts(*counts) if counts else Convex)
     # All of it here: Python calls no `__init__` of what is not of the class that was asked for.
     vars(made).update(vertices=vertices, edge_radius=edge_radius, _hull=hull, _core=core)
     return made
 
 
 @cache
-def _of_counts(faces: int, corners: int) -> type[Convex]:
-    """The class of polytopes of so many faces, whose cores have so many corners."""
-    own = {"counts": (faces, corners), "width": 4 * faces + 3 * corners + 1, "__module__": __name__}
-    return type(f"Convex{faces}x{corners}", (Convex,), own)
+def _of_counts(faces: int, corners: int, bevels: int) -> type[Convex]:
+    """The class of polytopes of so many faces and bevels, whose cores have so many corners."""
+    width = 4 * (faces + bevels) + 3 * corners + 1
+    own = {"counts": (faces, corners, bevels), "width": width, "__module__": __name__}
+    return type(f"Convex{faces}x{corners}x{bevels}", (Convex,), own)

@@ -6,6 +6,7 @@ import itertools
 import pickle
 from dataclasses import replace
 
+import casadi as ca
 import coal
 import numpy as np
 import pytest
@@ -13,8 +14,10 @@ from scipy.spatial.transform import Rotation
 
 from casadi_hands.geometry.bodies import KINDS
 from casadi_hands.geometry.bodies.box import Box
+from casadi_hands.geometry.bodies.capsule import Segment
 from casadi_hands.geometry.bodies.convex import Convex
 from casadi_hands.geometry.hull import ALIKE, hull_of
+from casadi_hands.geometry.pairs import core_distance
 from tests.geometry.bodies import checks
 
 CRATE = Box(np.array([0.1, -0.2, 0.3]), np.array([0.8, 1.4, 2.0]), np.array([0.3, -0.5, 0.9]), 0.01)
@@ -26,7 +29,7 @@ PRISM = Convex(np.array([[np.cos(a), np.sin(a), z] for a in ANGLES for z in (-1,
 
 
 def test_a_box_is_a_box(rng: np.random.Generator) -> None:
-    assert SAME.counts == (6, 8)
+    assert SAME.counts == (6, 8, 0)
     for point in checks.around(CRATE, rng, 300):
         expected, found = CRATE.signed_distance(point), SAME.signed_distance(point)
         local = np.abs(CRATE.turn.T @ (point - CRATE.center)) - CRATE.size / 2
@@ -125,7 +128,7 @@ def test_a_task_file_gives_a_polytope() -> None:
     }
     shape = checks.shape_in_task(f"convex: {{vertices: {points}}}", refused)
     assert isinstance(shape.body, KINDS["convex"])
-    assert shape.body.counts == (6, 8)
+    assert shape.body.counts == (6, 8, 0)
     assert shape.edge_radius == pytest.approx(0.0002)
 
 
@@ -143,3 +146,25 @@ def test_a_face_has_the_bounds_of_its_sharp_edges_alone() -> None:
     assert len(normals) == PRISM.face_bounds
     assert np.all(normals @ top <= offsets)
     assert not np.all(normals @ [0.2, 0.995, 1.0] <= offsets)
+
+
+def test_next_to_acute_edges_links_are_not_much_farther_than_they_seem(rng: np.random.Generator) -> None:
+    """By its faces alone, a link abreast of a blade's edge seems to be at less than half of its distance."""
+    blade = Convex(np.array([[x, y, z] for z in (-1, 1) for x, y in ((0, 0), (-2, 0.5), (-2, -0.5))]), 0.01)
+    assert blade.counts == (5, 6, 4)
+    surface = type(blade).surface(ca.SX(blade.parameters))
+    ends = [ca.SX.sym(name, 3) for name in ("start", "end")]
+    distance = ca.Function("distance", ends, [core_distance(Segment(*ends), surface.core) - surface.radius])
+    shares = []
+    for _ in range(200):
+        away = rng.uniform(-np.pi / 2, np.pi / 2)  # all around the edge, seen along it
+        at = rng.uniform(0.3, 1) * np.array([np.cos(away), np.sin(away), 0])
+        start, end = (at + z * np.array([0, 0, 1]) for z in (-0.3, 0.4))
+        length = float(np.linalg.norm(end - start))
+        truth = checks.coal_distance(checks.along_z(coal.Capsule(1e-6, length), start, end), _hull(blade))
+        by_faces = float((blade._hull.normals @ at - blade._hull.reaches).max())
+        shares.append((float(distance(start, end)) / truth, by_faces / truth))
+    found, plain = np.transpose(shares)
+    assert plain.min() < 0.5
+    assert found.min() > 0.8
+    assert found.max() < 1.01

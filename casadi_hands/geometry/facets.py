@@ -1,0 +1,92 @@
+"""The core of a polytope, in symbols: what is inside of flat faces, the nearest of which is chosen softly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from casadi_hands.geometry.bodies.body import Core
+from casadi_hands.geometry.smooth import constant, norm
+
+# The surface is where log Σ exp β(n·x - d) vanishes; with this β times its edges' radius, square edges are as far
+# inside those of the faces as round ones of that radius would be.
+SHARPNESS = float(np.sqrt(2) * np.log(2) / (np.sqrt(2) - 1))
+_LOWEST = 1e-3  # lengths by which corners may be higher than the lowest and count for it
+
+
+@dataclass(frozen=True)
+class Facets(Core):
+    """What is inside of all faces.
+
+    Attributes:
+        normals: (F, 3) outward, in the frame of the body.
+        reaches: (F, 1) of the faces' planes along them, moved so that the surface goes through the faces' middles.
+        corners: (V, 3) of the core.
+        edge: radius of the rounded edges.
+        bevels: (B, 3) normals of planes along acute edges, of which links keep clear, too.
+        bevel_reaches: (B, 1) of those.
+    """
+
+    normals: SX
+    reaches: SX
+    corners: SX
+    edge: SX
+    bevels: SX
+    bevel_reaches: SX
+
+    def for_links(self) -> Facets:
+        """See `Core`: with the bevels among the faces, since next to acute edges these alone are much too far out."""
+        normals, reaches = ca.vertcat(self.normals, self.bevels), ca.vertcat(self.reaches, self.bevel_reaches)
+        return replace(self, normals=normals, reaches=reaches, bevels=SX(0, 3), bevel_reaches=SX(0, 1))
+
+    def _weighed(self, beyond: SX) -> tuple[SX, SX, SX]:
+        """Of how far a point is beyond the faces (F, 1): the most, weights (F, 1) of the nearest, and their sum."""
+        most = constant(ca.mmax(beyond))
+        weights = ca.exp(SHARPNESS / self.edge * (beyond - most))
+        return most, weights, ca.sum1(weights)
+
+    def _beyond(self, point: SX) -> SX:
+        """How far a point (3,) is beyond the faces (F, 1)."""
+        return ca.mtimes(self.normals, point) - self.reaches
+
+    def distance_and_normal(self, point: SX, rounding: float) -> tuple[SX, SX]:
+        """See `Core`; outside, the distance of a plane that is as steep as the nearest faces are together."""
+        most, weights, total = self._weighed(self._beyond(point))
+        beyond = most + ca.log(total) * self.edge / SHARPNESS
+        mean = ca.mtimes(self.normals.T, weights) / total
+        steep = norm(mean, 1e-6)
+        return ca.if_else(beyond > 0, beyond / steep, beyond) + self.edge, mean / steep
+
+    def slopes(self, start: SX, along: SX) -> Callable[[SX], SX]:
+        """See `Core`."""
+        first, change = self._beyond(start), ca.mtimes(self.normals, along)
+
+        def slope(share: SX) -> SX:
+            _, weights, total = self._weighed(first + share * change)
+            return ca.dot(weights, change) / total
+
+        return slope
+
+    def ball(self) -> tuple[SX, SX]:
+        """See `Core`."""
+        center = ca.sum1(self.corners).T / self.corners.shape[0]
+        return center, ca.mmax(ca.sqrt(ca.sum2((self.corners - ca.repmat(center.T, self.corners.shape[0], 1)) ** 2)))
+
+    def offset(self, point: SX) -> SX:
+        """See `Core`."""
+        distance, normal = self.distance_and_normal(point, 0.0)
+        return distance * normal
+
+    def marks(self, up: SX) -> list[SX]:
+        """See `Core`: the lowest."""
+        return self.lowest(up)
+
+    def lowest(self, up: SX) -> list[SX]:
+        """See `Core`: a corner; the middle of the corners that are level."""
+        heights = ca.mtimes(self.corners, up)
+        weights = ca.exp((constant(ca.mmin(heights)) - heights) / _LOWEST)
+        return [ca.mtimes(self.corners.T, weights) / ca.sum1(weights)]
