@@ -80,7 +80,7 @@ CORNERS = [[x, y, z] for x in (0.0, 0.04) for y in (-0.015, 0.015) for z in (-0.
 
 @pytest.mark.parametrize("second", [BLOCK, f"convex: {{vertices: {CORNERS}}}"], ids=["box", "polytope"])
 def test_where_two_parts_meet_a_contact_is_on_a_face_of_one(second: str) -> None:
-    """The seam is an edge of both, and none of the object: whichever part is touched, its normal there is the face's."""
+    """The seam is an edge of both, and none of the object: the normal is a face's, whichever part is touched."""
     task = parse_task(SPLIT.replace("SECOND", second))
     given = np.array([[0, 0.015, 0.001], [0.0001, -0.015, 0.001], [-0.0001, 0.002, -0.015]])
     outward = [[0, 1, 0], [0, -1, 0], [0, 0, -1]]
