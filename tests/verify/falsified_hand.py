@@ -39,6 +39,7 @@ HAND_AGAINST_TASK: Cases = {
         ),
         r"joint finger0_joint0: its limits in hand\.urdf are -1000 and 1000 rad, the task's -2\.618",
     ),
+    "a hand that is a number": (record("hand", value=-1), r"hand: result\.json has no list of fingers"),
     "a stated limit": (record("hand", "joint_upper", value=3.0), r"joint_upper: joint finger0_joint0"),
     "narrower limits in the task": (task("[-150.0, 150.0]", "[-40.0, 40.0]"), r"its limits in hand\.urdf"),
     "a palm of 10 mm": (

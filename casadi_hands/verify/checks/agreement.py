@@ -12,7 +12,7 @@ from casadi_hands.verify.checks.servos import put_together
 from casadi_hands.verify.checks.sizes import hinge_of, radius_of
 from casadi_hands.verify.forms import FORMS
 from casadi_hands.verify.reading.folder import Folder
-from casadi_hands.verify.reading.stored import as_array, entry, same
+from casadi_hands.verify.reading.stored import as_array, brief, entry, same
 from casadi_hands.verify.shapes import Capsule, Cylinder, Shape
 
 STATUSES = ("certified", "feasible", "failed")
@@ -86,15 +86,10 @@ def record_problems(folder: Folder) -> list[str]:
         agrees = stated == value if value is None or isinstance(value, str) else same(stated, value)
         if not agrees:
             source = "motion.npz" if key in sizes else "task.yaml"
-            problems.append(f"{key}: result.json says {_brief(stated)}, {source} says {_brief(value)}")
+            problems.append(f"{key}: result.json says {brief(stated)}, {source} says {brief(value)}")
     if record.get("status") not in STATUSES:
-        problems.append(f"status: result.json says {_brief(record.get('status'))}, not one of {', '.join(STATUSES)}")
+        problems.append(f"status: result.json says {brief(record.get('status'))}, not one of {', '.join(STATUSES)}")
     return problems + _goal_problems(folder)
-
-
-def _brief(value: Any) -> str:
-    text = "none" if value is None else str(value)
-    return text if len(text) <= 60 else f"{text[:57]}…"
 
 
 def _goal_problems(folder: Folder) -> list[str]:
@@ -136,7 +131,7 @@ def hand_problems(folder: Folder) -> list[str]:
         if off:
             problems.append(f"{key}: joint {off[0]} has another in hand.urdf than result.json says")
     if not same(entry(hand, "density"), folder.task.hand.density):
-        problems.append(f"density: result.json says {_brief(entry(hand, 'density'))}, not the task's")
+        problems.append(f"density: result.json says {brief(entry(hand, 'density'))}, not the task's")
     links, joints = {"palm"}, set()
     for i, finger in enumerate(fingers):
         name = folder.fingers[i] if i < len(folder.fingers) else None
@@ -160,7 +155,7 @@ def _palm_body_problems(folder: Folder, body: Body, stated: Any) -> list[str]:
     palm = folder.task.palm
     for name, due in (("radius", palm.radius), ("thickness", palm.thickness)):
         if not same(entry(stated, name), due):
-            problems.append(f"palm: result.json says {_brief(entry(stated, name))} m of {name}, the task {due:.6g} m")
+            problems.append(f"palm: result.json says {brief(entry(stated, name))} m of {name}, the task {due:.6g} m")
     discs = [shape for shape in body.shapes if isinstance(shape, Cylinder)]
     if len(discs) != 1:
         return [*problems, "the palm: hand.urdf has not the one disc that it is"]

@@ -9,15 +9,16 @@ from scipy.spatial.transform import Rotation
 
 from casadi_hands.verify.bodies import Body
 from casadi_hands.verify.reading.folder import Folder
+from casadi_hands.verify.reading.stored import brief, entry
 from casadi_hands.verify.shapes import Capsule
 
 
 def servo_problems(folder: Folder) -> list[str]:
     """Return where the servos of ``hand.urdf`` are not one in every joint as the task says, a sentence each."""
-    drive, stated = folder.task.hand.drive, (folder.result.get("hand") or {}).get("servo")
+    drive, stated = folder.task.hand.drive, entry(folder.result.get("hand"), "servo")
     problems = []
     if stated != drive.servo:
-        problems.append(f"servo: result.json says {stated or 'none'}, the task {drive.servo or 'none'}")
+        problems.append(f"servo: result.json says {brief(stated)}, the task {brief(drive.servo)}")
     for name, body in folder.links.items():
         turned = [joint for joint in folder.joints.values() if joint.parent == name] if drive.motor else []
         if len(body.cases) != len(turned):

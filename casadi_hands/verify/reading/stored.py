@@ -134,6 +134,12 @@ def entry(value: Any, *names: str | int) -> Any:
     return value
 
 
+def brief(value: Any) -> str:
+    """An entry in a few words, however long it is."""
+    text = "none" if value is None else str(value)
+    return text if len(text) <= 60 else f"{text[:57]}…"
+
+
 def same(one: Any, other: Any, tolerance: float = 1e-6) -> bool:
     """Whether numbers or arrays agree to a share of the second's size; what is none agrees with nothing."""
     if one is None or other is None:
