@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
 from casadi_hands.geometry.bodies.body import Core
+from casadi_hands.geometry.segments import nearest_points, segment_distance
 from casadi_hands.geometry.smooth import constant, norm
 
 # The surface is where log Σ exp β(n·x - d) vanishes; with this β times its edges' radius, square edges are as far
@@ -27,21 +28,31 @@ class Facets(Core):
         reaches: (F, 1) of the faces' planes along them, moved so that the surface goes through the faces' middles.
         corners: (V, 3) of the core.
         edge: radius of the rounded edges.
-        bevels: (B, 3) normals of planes along acute edges, of which links keep clear, too.
-        bevel_reaches: (B, 1) of those.
+        starts: (E, 3) of the sharp edges between faces.
+        ends: (E, 3) of those.
     """
 
     normals: SX
     reaches: SX
     corners: SX
     edge: SX
-    bevels: SX
-    bevel_reaches: SX
+    starts: SX
+    ends: SX
 
-    def for_links(self) -> Facets:
-        """See `Core`: with the bevels among the faces, since next to acute edges these alone are much too far out."""
-        normals, reaches = ca.vertcat(self.normals, self.bevels), ca.vertcat(self.reaches, self.bevel_reaches)
-        return replace(self, normals=normals, reaches=reaches, bevels=SX(0, 3), bevel_reaches=SX(0, 1))
+    def beside(self, start: SX, end: SX) -> tuple[SX, SX]:
+        """See `Core`: the distance from the nearest edge, which the planes across the way to it bound."""
+        found, nearest = SX(np.inf), SX.zeros(6)
+        for k in range(self.starts.shape[0]):
+            edge = ca.horzcat(self.starts[k, :], self.ends[k, :]).T
+            distance = segment_distance(start, end, edge[:3], edge[3:])
+            nearest = ca.if_else(distance < found, edge, nearest)
+            found = ca.fmin(distance, found)
+        between = ca.vertcat(*nearest_points(start, end, nearest[:3], nearest[3:]))
+        way = between[:3] - between[3:]
+        way /= norm(way, 1e-9)
+        farthest = ca.mmax(ca.vertcat(ca.mtimes(self.starts, way), ca.mtimes(self.ends, way)))
+        apart = ca.fmin(ca.dot(way, start), ca.dot(way, end)) - farthest
+        return apart + self.edge, segment_distance(start, end, nearest[:3], nearest[3:]) + self.edge
 
     def _weighed(self, beyond: SX) -> tuple[SX, SX, SX]:
         """Of how far a point is beyond the faces (F, 1): the most, weights (F, 1) of the nearest, and their sum."""

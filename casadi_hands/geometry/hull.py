@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 Array = NDArray[np.float64]
-_ACUTE, _STEP = np.radians(95), np.radians(65)  # between normals of faces: where there are bevels, and how many
+_FLAT = np.cos(np.radians(3))  # of the angle between faces: next to blunter edges their planes are near enough
 ALIKE = 1e-4  # of a unit normal, and of the size: faces that differ by less are one
 
 
@@ -22,26 +22,20 @@ class Hull:
         reaches: (F,) of their planes along them.
         corners: (V, 3).
         triangles: (T, 3) of their numbers, counterclockwise seen from outside.
-        bevels: (B, 3) unit normals of planes that touch it along sharp edges only, see `bevels_of`.
+        edges: (E, 2) numbers of corners at the ends of each.
     """
 
     normals: Array
     reaches: Array
     corners: Array
     triangles: NDArray[np.int_]
-    bevels: Array
-
-    @property
-    def bevel_reaches(self) -> Array:
-        """(B,) of the bevels' planes along their normals."""
-        return np.asarray((self.bevels @ self.corners.T).max(axis=1))
+    edges: NDArray[np.int_]
 
     def placed(self, rotation: Array, position: Array) -> Hull:
         """The same polytope turned by a rotation (3, 3), then shifted by (3,): faces and corners stay what they are."""
         normals = self.normals @ rotation.T
         corners = self.corners @ rotation.T + position
-        reaches, bevels = self.reaches + normals @ position, self.bevels @ rotation.T
-        return replace(self, normals=normals, reaches=reaches, corners=corners, bevels=bevels)
+        return replace(self, normals=normals, reaches=self.reaches + normals @ position, corners=corners)
 
 
 def hull_of(points: Array) -> Hull:
@@ -61,30 +55,20 @@ def hull_of(points: Array) -> Hull:
     new = {int(old): k for k, old in enumerate(found.vertices)}
     triangles = np.array([[new[int(v)] for v in triangle] for triangle in found.simplices])
     triangles = turned_outward(triangles, corners, planes[:, :3])
-    return Hull(faces[:, :3], -faces[:, 3], corners, triangles, bevels_of(corners, triangles))
+    return Hull(faces[:, :3], -faces[:, 3], corners, triangles, edges_of(corners, triangles))
 
 
-def bevels_of(corners: Array, triangles: NDArray[np.int_]) -> Array:
-    """Unit normals (B, 3) between those of faces that meet in an acute edge, so that none are far from the next.
-
-    How far a point is beyond the planes of all faces tells how far it is from a polytope but near its edges: there it
-    is less, and of acute ones by more than half.
-    """
+def edges_of(corners: Array, triangles: NDArray[np.int_]) -> NDArray[np.int_]:
+    """Pairs (E, 2) of corners between which faces meet at an angle, each pair once."""
     normals = crossed(corners[triangles])
     normals /= np.linalg.norm(normals, axis=1)[:, None]
-    owner: dict[tuple[int, int], int] = {}
-    found: list[Array] = []
+    owner, found = {}, []
     for number, triangle in enumerate(triangles):
         for i, j in ((int(triangle[k - 1]), int(triangle[k])) for k in range(3)):
             owner[i, j] = number
-            if (j, i) not in owner:
-                continue
-            one, other = normals[number], normals[owner[j, i]]
-            angle = float(np.arccos(np.clip(one @ other, -1, 1)))
-            steps = int(np.ceil(angle / _STEP)) if angle > _ACUTE else 1
-            shares = np.arange(1, steps)[:, None] / steps
-            found.extend((np.sin((1 - shares) * angle) * one + np.sin(shares * angle) * other) / np.sin(angle))
-    return np.reshape(found, (-1, 3))
+            if (j, i) in owner and normals[number] @ normals[owner[j, i]] < _FLAT:
+                found.append((i, j))
+    return np.reshape(np.array(found, int), (-1, 2))
 
 
 def turned_outward(triangles: NDArray[np.int_], corners: Array, normals: Array) -> NDArray[np.int_]:

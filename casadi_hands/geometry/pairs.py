@@ -39,7 +39,6 @@ def _segment_and_core(one: Segment, other: Core, enough: SX | None = None) -> SX
     start, end, core = one.start, one.end, other
     if isinstance(other, Placed):
         start, end, core = other.own(one.start), other.own(one.end), other.core
-    core = core.for_links()
     parts = list(vars(core).values())  # its fields
     nearest, used = _nearest(type(core), tuple(part.shape for part in parts))
     here = constant(start), constant(end)
@@ -98,6 +97,12 @@ def _nearest(kind: type[Core], shapes: tuple[tuple[int, int], ...]) -> tuple[Fun
     moved = by[:3] + place * (along + by[3:] - by[:3]) - share * along
     distance = value + ca.dot(gradient, moved) + ca.bilin(hessian, moved, moved) / 2
     value, gradient, hessian = _expanded(distance, by, SX.zeros(6))
+    if beside := core.beside(start, end):
+        least, instead = beside
+        more, others = least > value, _expanded(instead, ends, ends)
+        value, gradient, hessian = (
+            ca.if_else(more, a, b) for a, b in zip(others, (value, gradient, hessian), strict=True)
+        )
     results = ca.cse([value, gradient, ca.triu(hessian, False) + ca.diag(ca.diag(hessian)) / 2])
     used = [k for k, part in enumerate(parts) if any(ca.depends_on(each, part) for each in results)]
     inputs = [start, end, *[parts[k] for k in used]]

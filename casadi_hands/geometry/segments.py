@@ -19,6 +19,17 @@ def segment_distance(start: SX, end: SX, other_start: SX, other_end: SX) -> SX:
     rounded off at zero. It is never too small, and too large by at most 1e-4 of the summed lengths where segments
     are 0.3 or more apart, by 1e-3 where they nearly touch and are nearly parallel.
     """
+    s, t = _shares(start, end, other_start, other_end)
+    return norm(start - other_start + s * (end - start) - t * (other_end - other_start), _ROUNDING)
+
+
+def nearest_points(start: SX, end: SX, other_start: SX, other_end: SX) -> tuple[SX, SX]:
+    """The closest points (3,) of two segments, as `segment_distance` takes them."""
+    s, t = _shares(start, end, other_start, other_end)
+    return start + s * (end - start), other_start + t * (other_end - other_start)
+
+
+def _shares(start: SX, end: SX, other_start: SX, other_end: SX) -> tuple[SX, SX]:
     along, other_along, between = end - start, other_end - other_start, start - other_start
     length2, other_length2 = ca.sumsqr(along), ca.sumsqr(other_along)
     tie = _TIE * (length2 + other_length2) + 1e-9
@@ -26,8 +37,7 @@ def segment_distance(start: SX, end: SX, other_start: SX, other_end: SX) -> SX:
     c, f = ca.dot(along, between) - tie / 2, ca.dot(other_along, between) + tie / 2
     s = clamp((b * f - c * e) / (a * e - b * b), 0, 1)
     t = clamp((b * s + f) / e, 0, 1)
-    s = clamp((b * t - c) / a, 0, 1)
-    return norm(between + s * along - t * other_along, _ROUNDING)
+    return clamp((b * t - c) / a, 0, 1), t
 
 
 def point_segment_distance(start: SX, end: SX, point: SX) -> SX:

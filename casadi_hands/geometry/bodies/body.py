@@ -72,9 +72,12 @@ class Core(ABC):
         """How deep a point is within the core, zero outside: what its distance is continued by there."""
         return SX(0)
 
-    def for_links(self) -> Core:
-        """What distances from links are measured to, where that is another core than contacts roll on."""
-        return self
+    def beside(self, start: SX, end: SX) -> tuple[SX, SX] | None:
+        """What a segment's distance, both ends (3,), is at least, and what it is where that is more than found else.
+
+        None of cores whose `distance_and_normal` is right everywhere.
+        """
+        return None
 
     def ball(self) -> tuple[SX, SX] | None:
         """Centre (3,) and radius of a ball that holds it; None where its distances are found as soon as the ball's."""

@@ -39,7 +39,7 @@ class Convex(Body):
     """The least polytope about some points.
 
     Attributes:
-        counts: of faces, corners of the core, and bevels; like ``width``, classes that `_of_counts` makes have it.
+        counts: of faces, corners of the core, and edges; like ``width``, classes that `_of_counts` makes have it.
     """
 
     kind: ClassVar[str] = "convex"
@@ -75,20 +75,20 @@ class Convex(Body):
 
     @property
     def parameters(self) -> Array:
-        """See `Body`: normals of faces and bevels, their reaches, corners of the core, edge radius."""
+        """See `Body`: faces' normals and reaches, corners of the core, starts and ends of edges, edge radius."""
         hull = self._hull
-        planes = [hull.normals.ravel(), self._reaches, hull.bevels.ravel(), hull.bevel_reaches]
-        return np.concatenate([*planes, self._core.corners.ravel(), [self.edge_radius]])
+        points = [self._core.corners, *(hull.corners[hull.edges[:, k]] for k in (0, 1))]
+        return np.concatenate([hull.normals.ravel(), self._reaches, *map(np.ravel, points), [self.edge_radius]])
 
     @classmethod
     def surface(cls, parameters: SX) -> Surface:
         """See `Body`."""
-        faces, corners, bevels = cls.counts
-        ends = np.cumsum([0, 3 * faces, faces, 3 * bevels, bevels, 3 * corners]).tolist()
-        found = [parameters[a:b] for a, b in itertools.pairwise(ends)]
-        normals, sloping, points = (ca.reshape(each, 3, -1).T for each in found[::2])
-        edge = parameters[ends[-1]]
-        return Surface(Facets(normals, found[1], points, edge, sloping, found[3]), edge)
+        faces, corners, edges = cls.counts
+        places = np.cumsum([0, 3 * faces, faces, 3 * corners, 3 * edges, 3 * edges]).tolist()
+        normals, reaches, *points = (parameters[a:b] for a, b in itertools.pairwise(places))
+        rows = [ca.reshape(each, 3, -1).T for each in (normals, *points)]
+        radius = parameters[places[-1]]
+        return Surface(Facets(rows[0], reaches, rows[1], radius, *rows[2:]), radius)
 
     @cached_property
     def _reaches(self) -> Array:
@@ -214,7 +214,7 @@ class Convex(Body):
 
 def _of_hulls(vertices: Array, edge_radius: float, hull: Hull | None, core: Hull | None) -> Convex:
     """The body of some points whose hull and core are known; None of those that there are none of."""
-    counts = (len(hull.normals), len(core.corners), len(hull.bevels)) if hull and core else None
+    counts = (len(hull.normals), len(core.corners), len(hull.edges)) if hull and core else None
     made = object.__new__(_of_counts(*counts) if counts else Convex)
     # All of it here: Python calls no `__init__` of what is not of the class that was asked for.
     vars(made).update(vertices=vertices, edge_radius=edge_radius, _hull=hull, _core=core)
@@ -222,8 +222,8 @@ def _of_hulls(vertices: Array, edge_radius: float, hull: Hull | None, core: Hull
 
 
 @cache
-def _of_counts(faces: int, corners: int, bevels: int) -> type[Convex]:
-    """The class of polytopes of so many faces and bevels, whose cores have so many corners."""
-    width = 4 * (faces + bevels) + 3 * corners + 1
-    own = {"counts": (faces, corners, bevels), "width": width, "__module__": __name__}
-    return type(f"Convex{faces}x{corners}x{bevels}", (Convex,), own)
+def _of_counts(faces: int, corners: int, edges: int) -> type[Convex]:
+    """The class of polytopes of so many faces and edges, whose cores have so many corners."""
+    width = 4 * faces + 3 * corners + 6 * edges + 1
+    own = {"counts": (faces, corners, edges), "width": width, "__module__": __name__}
+    return type(f"Convex{faces}x{corners}x{edges}", (Convex,), own)

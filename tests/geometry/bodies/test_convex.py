@@ -29,7 +29,7 @@ PRISM = Convex(np.array([[np.cos(a), np.sin(a), z] for a in ANGLES for z in (-1,
 
 
 def test_a_box_is_a_box(rng: np.random.Generator) -> None:
-    assert SAME.counts == (6, 8, 0)
+    assert SAME.counts == (6, 8, 12)
     for point in checks.around(CRATE, rng, 300):
         expected, found = CRATE.signed_distance(point), SAME.signed_distance(point)
         local = np.abs(CRATE.turn.T @ (point - CRATE.center)) - CRATE.size / 2
@@ -83,10 +83,9 @@ def test_mass_properties_are_those_of_coal() -> None:
     checks.check_solid(WEDGE, _hull(WEDGE))
 
 
-@pytest.mark.parametrize("body", [SAME, PRISM], ids=["box", "prism"])
+@pytest.mark.parametrize("body", [SAME, PRISM, WEDGE], ids=["box", "prism", "wedge"])
 def test_the_distance_of_a_link_is_that_of_coal(body: Convex, rng: np.random.Generator) -> None:
-    """Near the surface; farther off beside edges it is too small."""
-    checks.check_links(body, _hull(body), rng, near=0.1, short=0.05, swept=body.ball)
+    checks.check_links(body, _hull(body), rng, most=8e-3, swept=body.ball)
 
 
 def test_it_travels() -> None:
@@ -128,7 +127,7 @@ def test_a_task_file_gives_a_polytope() -> None:
     }
     shape = checks.shape_in_task(f"convex: {{vertices: {points}}}", refused)
     assert isinstance(shape.body, KINDS["convex"])
-    assert shape.body.counts == (6, 8, 0)
+    assert shape.body.counts == (6, 8, 12)
     assert shape.edge_radius == pytest.approx(0.0002)
 
 
@@ -148,10 +147,10 @@ def test_a_face_has_the_bounds_of_its_sharp_edges_alone() -> None:
     assert not np.all(normals @ [0.2, 0.995, 1.0] <= offsets)
 
 
-def test_next_to_acute_edges_links_are_not_much_farther_than_they_seem(rng: np.random.Generator) -> None:
+def test_next_to_acute_edges_links_are_as_far_as_they_seem(rng: np.random.Generator) -> None:
     """By its faces alone, a link abreast of a blade's edge seems to be at less than half of its distance."""
     blade = Convex(np.array([[x, y, z] for z in (-1, 1) for x, y in ((0, 0), (-2, 0.5), (-2, -0.5))]), 0.01)
-    assert blade.counts == (5, 6, 4)
+    assert blade.counts == (5, 6, 9)
     surface = type(blade).surface(ca.SX(blade.parameters))
     ends = [ca.SX.sym(name, 3) for name in ("start", "end")]
     distance = ca.Function("distance", ends, [core_distance(Segment(*ends), surface.core) - surface.radius])
@@ -166,5 +165,4 @@ def test_next_to_acute_edges_links_are_not_much_farther_than_they_seem(rng: np.r
         shares.append((float(distance(start, end)) / truth, by_faces / truth))
     found, plain = np.transpose(shares)
     assert plain.min() < 0.5
-    assert found.min() > 0.8
-    assert found.max() < 1.01
+    np.testing.assert_allclose(found, 1, atol=5e-3)
