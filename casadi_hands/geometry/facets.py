@@ -28,7 +28,8 @@ class Facets(Core):
         reaches: (F, 1) of the faces' planes along them, moved so that the surface goes through the faces' middles.
         corners: (V, 3) of the core.
         edge: radius of the rounded edges.
-        starts: (E, 3) of the sharp edges between faces.
+        tips: (W, 3) corners of the polytope itself.
+        starts: (E, 3) of its sharp edges.
         ends: (E, 3) of those.
     """
 
@@ -36,6 +37,7 @@ class Facets(Core):
     reaches: SX
     corners: SX
     edge: SX
+    tips: SX
     starts: SX
     ends: SX
 
@@ -50,8 +52,7 @@ class Facets(Core):
         between = ca.vertcat(*nearest_points(start, end, nearest[:3], nearest[3:]))
         way = between[:3] - between[3:]
         way /= norm(way, 1e-9)
-        farthest = ca.mmax(ca.vertcat(ca.mtimes(self.starts, way), ca.mtimes(self.ends, way)))
-        apart = ca.fmin(ca.dot(way, start), ca.dot(way, end)) - farthest
+        apart = ca.fmin(ca.dot(way, start), ca.dot(way, end)) - ca.mmax(ca.mtimes(self.tips, way))
         return apart + self.edge, segment_distance(start, end, nearest[:3], nearest[3:]) + self.edge
 
     def _weighed(self, beyond: SX) -> tuple[SX, SX, SX]:
@@ -82,10 +83,11 @@ class Facets(Core):
 
         return slope
 
-    def ball(self) -> tuple[SX, SX]:
+    def bound(self) -> tuple[SX, SX]:
         """See `Core`."""
-        center = ca.sum1(self.corners).T / self.corners.shape[0]
-        return center, ca.mmax(ca.sqrt(ca.sum2((self.corners - ca.repmat(center.T, self.corners.shape[0], 1)) ** 2)))
+        count = self.tips.shape[0]
+        center = ca.sum1(self.tips) / count
+        return center.T, ca.sqrt(ca.mmax(ca.sum2((self.tips - ca.repmat(center, count, 1)) ** 2)))
 
     def offset(self, point: SX) -> SX:
         """See `Core`."""

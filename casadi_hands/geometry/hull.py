@@ -10,6 +10,7 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 Array = NDArray[np.float64]
 _FLAT = np.cos(np.radians(3))  # of the angle between faces: next to blunter edges their planes are near enough
+_TIP = np.cos(np.radians(10))  # of the largest angle between faces about a corner, likewise
 ALIKE = 1e-4  # of a unit normal, and of the size: faces that differ by less are one
 
 
@@ -22,7 +23,7 @@ class Hull:
         reaches: (F,) of their planes along them.
         corners: (V, 3).
         triangles: (T, 3) of their numbers, counterclockwise seen from outside.
-        edges: (E, 2) numbers of corners at the ends of each.
+        edges: (E, 2) numbers of corners at the ends of each sharp one, see `edges_of`.
     """
 
     normals: Array
@@ -59,15 +60,24 @@ def hull_of(points: Array) -> Hull:
 
 
 def edges_of(corners: Array, triangles: NDArray[np.int_]) -> NDArray[np.int_]:
-    """Pairs (E, 2) of corners between which faces meet at an angle, each pair once."""
+    """Pairs (E, 2) of corners between which faces meet at an angle, each pair once; and tips of none of these, twice.
+
+    A tip is a corner about which faces are turned, like that of a cone of many sides.
+    """
     normals = crossed(corners[triangles])
     normals /= np.linalg.norm(normals, axis=1)[:, None]
-    owner, found = {}, []
+    owner: dict[tuple[int, int], int] = {}
+    found = []
     for number, triangle in enumerate(triangles):
         for i, j in ((int(triangle[k - 1]), int(triangle[k])) for k in range(3)):
             owner[i, j] = number
             if (j, i) in owner and normals[number] @ normals[owner[j, i]] < _FLAT:
                 found.append((i, j))
+    blunt = set(range(len(corners))) - {corner for edge in found for corner in edge}
+    for corner in sorted(blunt):
+        around = normals[(triangles == corner).any(axis=1)]
+        if (around @ around.T).min() < _TIP:
+            found.append((corner, corner))
     return np.reshape(np.array(found, int), (-1, 2))
 
 

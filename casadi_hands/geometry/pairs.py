@@ -30,19 +30,17 @@ def _segment_and_point(one: Segment, other: Point) -> SX:
     return point_segment_distance(one.start, one.end, other.at)
 
 
-def _segment_and_core(one: Segment, other: Core, enough: SX | None = None) -> SX:
+def _segment_and_core(one: Segment, core: Core, enough: SX | None = None) -> SX:
     """The least over the segment of the distance from a convex set, which is constant in its own frame.
 
     All that it takes to find it is a function of its own, whose results are constants to derivatives: those of the
     distance are a quadratic's. So they cost the same however many faces the core has.
     """
-    start, end, core = one.start, one.end, other
-    if isinstance(other, Placed):
-        start, end, core = other.own(one.start), other.own(one.end), other.core
+    start, end = one.start, one.end
     parts = list(vars(core).values())  # its fields
     nearest, used = _nearest(type(core), tuple(part.shape for part in parts))
     here = constant(start), constant(end)
-    given, ball = (*here, *[parts[k] for k in used]), core.ball()
+    given, ball = (*here, *[parts[k] for k in used]), core.bound()
     if enough is not None and ball is not None:
         least = norm((here[0] + here[1]) / 2 - ball[0]) - norm(here[1] - here[0]) / 2 - ball[1]
         nearest, given = _unless_far(nearest), (least < enough, *given)
@@ -99,7 +97,7 @@ def _nearest(kind: type[Core], shapes: tuple[tuple[int, int], ...]) -> tuple[Fun
     value, gradient, hessian = _expanded(distance, by, SX.zeros(6))
     if beside := core.beside(start, end):
         least, instead = beside
-        more, others = least > value, _expanded(instead, ends, ends)
+        more, others = ca.logic_or(least > value, value > instead), _expanded(instead, ends, ends)
         value, gradient, hessian = (
             ca.if_else(more, a, b) for a, b in zip(others, (value, gradient, hessian), strict=True)
         )
@@ -160,5 +158,7 @@ def core_distance(one: Segment, other: Core, enough: SX | None = None) -> SX:
         other: the core.
         enough: where it is more, it need not be found; any such distance may be given then.
     """
+    if isinstance(other, Placed):
+        return core_distance(Segment(other.own(one.start), other.own(one.end)), other.core, enough)
     closed = _TABLE.get((type(one), type(other)))
     return closed(one, other) if closed else _segment_and_core(one, other, enough)

@@ -72,18 +72,18 @@ class Refiner:
             margin: the first to be tried; by default what suits the hand.
             near: whether the motion is nearly exact already.
             homotopy: the homotopy parameter that its motion goes to: 1 at its goals.
-            grips: whether other grips are tried where the audit refuses it or replays fail; else little time is spent
-                on it, as on a hand that only takes the place of a certified one.
+            grips: whether others are tried where the audit refuses it, or replays fail of one that it refuses; else
+                little time is spent on it, as on a hand that would only take the place of a certified one.
 
         Returns:
             the design, replayed where its files hold, and its refinement.
         """
         planned, margins = self.record.design, margins_for(self.model, whole)
+        halvings = None if grips else 1
         margin, largest = margin or margins.ample, margins.larger
         refined, stage = self._exact(whole, margin, near, homotopy, largest)
-        judged, refined, stage = self._borne(
-            whole, self._between(whole, refined, stage, short, planned, most=None if grips else 1), short, planned
-        )
+        found = self._between(whole, refined, stage, short, planned, halvings)
+        judged, refined, stage = self._borne(whole, found, short, planned, halvings)
         if grips and refined.exact and judged.status != "certified" and not stage.passes_through(refined):
             # Where joints barely push, fingers may fold over in an instant: other forces take them another way.
             margin, which = (margins.ample, "smaller") if refined.margin == largest else (largest, "larger")
@@ -146,11 +146,11 @@ class Refiner:
         stage: Continuation,
         short: tuple[Reason, ...],
         planned: Design,
-        most: int | None = None,
+        halvings: int | None = None,
     ) -> Tried:
-        """Judge a refinement; where it is exact but between samples, halve intervals while it helps, ``most`` times."""
+        """Judge a refinement; where it is exact but between samples, halve intervals while it helps, as often as told."""
         judged = self._judged(stage.model, refined, short, planned)
-        for _ in itertools.count() if most is None else range(most):
+        for _ in itertools.count() if halvings is None else range(halvings):
             # Fingers that pass through each other do so on any knots.
             if not refined.exact or not judged.missed & BETWEEN or stage.passes_through(refined):
                 break
@@ -171,7 +171,9 @@ class Refiner:
             judged, refined, stage = design, closer, halved
         return judged, refined, stage
 
-    def _borne(self, whole: WholeHand, found: Tried, short: tuple[Reason, ...], planned: Design) -> Tried:
+    def _borne(
+        self, whole: WholeHand, found: Tried, short: tuple[Reason, ...], planned: Design, halvings: int | None = None
+    ) -> Tried:
         """An exact motion or, where its forces ask too much of links or bearings, one with others if it is better."""
         judged, refined, stage = found
         task, model = self.record.task, stage.model
@@ -186,7 +188,7 @@ class Refiner:
         other = self._with_margin(whole, refined, strong, refined.margin, text)
         if not other.exact:
             return found
-        borne = self._between(whole, other, strong, short, planned)
+        borne = self._between(whole, other, strong, short, planned, halvings)
         return min(found, borne, key=lambda each: rank_of(each[0]))
 
     def _played(

@@ -24,8 +24,7 @@ _TOGETHER = 1e-3
 # twice, or saving and loading it, leaves it equal to the last digit.
 _ROUNDING = 1e-12
 _OFF = 1e-6  # of the characteristic length, within which a point is on a surface
-_ABOVE = 0.05  # of it, radius of a ball that is to rest on a point without being in other bodies, but for so little
-_FLUSH = 0.95
+_SMOOTH = np.cos(np.radians(20))  # of the angle between faces that go on in one another
 _AWAY, _WAYS = (1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1), 24  # of it, and in how many directions: looked at for a face
 
 
@@ -87,29 +86,52 @@ def _snap(point: Vector, body: ManipulatedObject, path: tuple[str | int, ...], p
 
 
 def _off_seam(point: Array, body: Body, others: Sequence[Body], size: float) -> Array:
-    """A point (3,) or, where its body has an edge that is inside of another, the nearest one off that edge.
+    """A point (3,) or, where it is next to an edge beyond which another body's surface goes on, one off that edge.
 
-    Convex parts of a mesh meet in such seams, where the surface goes on as if there was none.
+    Convex parts of a mesh meet in such seams: edges of the parts, and none of the object.
+
+    Args:
+        point: on the surface of a body.
+        body: whose.
+        others: of the object.
+        size: characteristic length, m.
     """
-    above = _ABOVE * size
-
-    def clear(at: Array) -> bool:
-        return all(other.signed_distance(at + above * body.outward(at)) > _FLUSH * above for other in others)
-
     normals, most = body.face(point)
-    over = point + above * normals[normals @ point > most]  # beyond the edges that it is next to
-    in_seam = any(other.signed_distance(at) < 0 for other in others for at in over)
-    if not body.face_bounds or (clear(point) and not in_seam):
+    if np.all(normals @ point <= most):
         return point
     across = np.linalg.svd(body.outward(point)[None])[2][1:]
+    turns = 2 * np.pi * np.arange(_WAYS) / _WAYS
+    directions = np.column_stack([np.cos(turns), np.sin(turns)]) @ across
     for way in _AWAY:
-        for turn in 2 * np.pi * np.arange(_WAYS) / _WAYS:
-            at = body.on_surface(point + way * size * np.array([np.cos(turn), np.sin(turn)]) @ across)
-            normals, most = body.face(at)
-            outside = all(other.signed_distance(at) > -_OFF * size for other in others)
-            if outside and clear(at) and np.all(normals @ at <= most) and abs(body.signed_distance(at)) < _OFF * size:
-                return at
+        found = [(_flush(point, way * size * each, body, others, size), k) for k, each in enumerate(directions)]
+        best, k = max(found, key=lambda each: each[0])
+        if best > _SMOOTH:
+            return body.on_surface(point + way * size * directions[k])
     return point
+
+
+def _flush(point: Array, step: Array, body: Body, others: Sequence[Body], size: float) -> float:
+    """How well another body goes on where a body's face ends, the cosine between their normals; -1 where none does.
+
+    Args:
+        point: (3,) next to the edge.
+        step: (3,) to the face; the other body is on the other side.
+        body: with the edge.
+        others: of the object.
+        size: characteristic length, m.
+    """
+    at = body.on_surface(point + step)
+    normals, most = body.face(at)
+    off = [abs(body.signed_distance(at)), *(-other.signed_distance(at) for other in others)]
+    if max(off) > _OFF * size or np.any(normals @ at > most):
+        return -1.0
+    # Along the face as far beyond the edge, and twice as far, since the other's own edge is round, too.
+    normal, back = body.outward(at), point - at
+    along = back - (back @ normal) * normal
+    beyond = [(other, at + share * along) for other in others for share in (2, 3)]
+    found = [(other, there, other.on_surface(there)) for other, there in beyond]
+    near = [(other, on) for other, there, on in found if np.linalg.norm(on - there) < np.linalg.norm(along)]
+    return max((float(other.outward(on) @ normal) for other, on in near), default=-1.0)
 
 
 def _together(task: Task, moved: dict[str, Vector]) -> Iterator[Problem]:

@@ -331,7 +331,8 @@ class Ways:
     def taken(self, name: str, margin: Margin) -> Any:
         self.asked.append((name, margin))
         exact = self.exact or self.model.strength is None
-        taken = SimpleNamespace(exact=exact, barely_rolls=False, hand=None, runs=(), weights={}, margin=margin)
+        hand = SimpleNamespace(active=None)
+        taken = SimpleNamespace(exact=exact, barely_rolls=False, hand=hand, runs=(), weights={}, margin=margin)
         taken.sharpness = 0
         return taken
 
@@ -349,6 +350,9 @@ class Ways:
 
     def with_margin(self, exact: Any, margin: Margin) -> Any:
         return self.taken("with_margin", margin)
+
+    def renew(self, start: Any, sharpness: int, margin: Margin) -> Any:
+        return self.taken("renew", margin)
 
     def passes_through(self, refined: Any) -> bool:
         return self.passes
@@ -403,9 +407,9 @@ def refine(
 
     monkeypatch.setattr(Refiner, "_replayed", played)
     whole: Any = SimpleNamespace(contacts=(0, 1), fingers=(), active=None)
-    record, unused = Record(ball_task(), None, lambda _: None), SimpleNamespace()
+    record, judging = Record(ball_task(), None, lambda _: None), SimpleNamespace(audited=lambda _: None)
     model = replace(build_model(ball_task()), torsion=float(soft))
-    refiner = Refiner(record, model, unused, 1)  # type: ignore[arg-type]
+    refiner = Refiner(record, model, judging, 1)  # type: ignore[arg-type]
     design, refined = refiner.certify(whole, (), homotopy=homotopy, grips=grips)
     assert (next(judged, None), next(dropped, None)) == (None, None)
     if off is not None:
@@ -434,6 +438,44 @@ def test_where_a_hand_is_one_of_several_that_may_do_no_other_grip_is_tried(monke
     # One that is certified may grip better.
     ways = Ways(firm=False)
     assert refine(monkeypatch, ways, 1.0, ["certified"] * 2, [1, 0], grips=False) == (LARGE, 0)
+
+
+@pytest.mark.parametrize("grips", [True, False])
+def test_little_is_tried_of_a_hand_that_would_only_take_anothers_place(
+    monkeypatch: pytest.MonkeyPatch, grips: bool
+) -> None:
+    ways = Ways(firm=False)
+    judged = ["feasible"] * (2 if grips else 1)
+    assert refine(monkeypatch, ways, 1.0, judged, [], missed=["least_stiffness"], grips=grips) == (AMPLE, 0)
+    assert ways.asked == [("solve", AMPLE), ("with_margin", SOFT)][: len(judged)]
+
+
+@pytest.mark.parametrize("grips", [True, False])
+def test_of_such_a_hand_intervals_are_halved_once(monkeypatch: pytest.MonkeyPatch, grips: bool) -> None:
+    left = iter([True, True, True, False])
+    monkeypatch.setattr(refiner_module, "intervals_to_halve", lambda *_: np.full(6, next(left)))
+    monkeypatch.setattr(refiner_module, "resampled_model", lambda model, _: model)
+    monkeypatch.setattr(refiner_module, "resampled", lambda hand, *_: hand)
+    monkeypatch.setattr(refiner_module, "GAIN", 2.0)  # each halving is a gain
+    ways = Ways(firm=False)
+    if grips:
+        refine(monkeypatch, ways, 1.0, [*["feasible"] * 4, "certified"], [0], missed=["residual"])
+        assert [name for name, _ in ways.asked] == ["solve", *["renew"] * 3, "with_margin"]
+    else:
+        refine(monkeypatch, ways, 1.0, ["feasible"] * 2, [], missed=["residual"], grips=False)
+        assert [name for name, _ in ways.asked] == ["solve", "renew"]
+
+
+@pytest.mark.parametrize("missed", [["tip_deflection"], ["tip_deflection", "least_stiffness"]])
+def test_what_links_bear_is_a_limit_only_where_nothing_else_is_in_the_way(
+    monkeypatch: pytest.MonkeyPatch, missed: list[str]
+) -> None:
+    ways = Ways(firm=False)
+    refine(monkeypatch, ways, 1.0, ["feasible"] * 2, [], missed=missed, grips=False)
+    assert [name for name, _ in ways.asked] == ["solve", "with_margin"]
+    ways = Ways(firm=False)
+    refine(monkeypatch, ways, 1.0, ["feasible"], [], missed=[*missed, "friction"], grips=False)
+    assert [name for name, _ in ways.asked] == ["solve"]
 
 
 @pytest.mark.parametrize(("drops", "kept"), [([4, 3], SOFT), ([4, 4], AMPLE), ([0], AMPLE)])

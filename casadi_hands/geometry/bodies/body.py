@@ -49,7 +49,7 @@ class Solid:
 
 
 class Core(ABC):
-    """A convex core in symbols; all in one frame."""
+    """A convex core in symbols; all in one frame. Its fields are matrices (SX)."""
 
     @abstractmethod
     def offset(self, point: SX) -> SX:
@@ -73,14 +73,14 @@ class Core(ABC):
         return SX(0)
 
     def beside(self, start: SX, end: SX) -> tuple[SX, SX] | None:
-        """What a segment's distance, both ends (3,), is at least, and what it is where that is more than found else.
+        """Bounds of a segment's distance, both ends (3,): the upper one is the distance where the lower one is near it.
 
         None of cores whose `distance_and_normal` is right everywhere.
         """
         return None
 
-    def ball(self) -> tuple[SX, SX] | None:
-        """Centre (3,) and radius of a ball that holds it; None where its distances are found as soon as the ball's."""
+    def bound(self) -> tuple[SX, SX] | None:
+        """Centre (3,) and radius of a ball around it; None where its own distances are found as soon as the ball's."""
         return None
 
     def distance_and_normal(self, point: SX, rounding: float) -> tuple[SX, SX]:

@@ -39,12 +39,13 @@ class Convex(Body):
     """The least polytope about some points.
 
     Attributes:
-        counts: of faces, corners of the core, and edges; like ``width``, classes that `_of_counts` makes have it.
+        counts: of faces, corners of the core, sharp edges, and corners; like ``width``, that is of classes that
+            `_of_counts` makes.
     """
 
     kind: ClassVar[str] = "convex"
     face_bounds: ClassVar[int] = _MOST_BOUNDS
-    counts: ClassVar[tuple[int, int, int]]
+    counts: ClassVar[tuple[int, int, int, int]]
     _hull: ClassVar[Any]  # of each body a `Hull`, or None where there is none, and no field
     _core: ClassVar[Any]  # likewise
     vertices: Array = field(metadata={"about": "Its corners, m, object frame; a list of four or more.", "is": "points"})
@@ -75,16 +76,16 @@ class Convex(Body):
 
     @property
     def parameters(self) -> Array:
-        """See `Body`: faces' normals and reaches, corners of the core, starts and ends of edges, edge radius."""
+        """See `Body`: faces' normals and reaches, corners of the core and its own, edges' starts and ends, radius."""
         hull = self._hull
-        points = [self._core.corners, *(hull.corners[hull.edges[:, k]] for k in (0, 1))]
+        points = [self._core.corners, hull.corners, *(hull.corners[hull.edges[:, k]] for k in (0, 1))]
         return np.concatenate([hull.normals.ravel(), self._reaches, *map(np.ravel, points), [self.edge_radius]])
 
     @classmethod
     def surface(cls, parameters: SX) -> Surface:
         """See `Body`."""
-        faces, corners, edges = cls.counts
-        places = np.cumsum([0, 3 * faces, faces, 3 * corners, 3 * edges, 3 * edges]).tolist()
+        faces, corners, edges, tips = cls.counts
+        places = np.cumsum([0, 3 * faces, faces, 3 * corners, 3 * tips, 3 * edges, 3 * edges]).tolist()
         normals, reaches, *points = (parameters[a:b] for a, b in itertools.pairwise(places))
         rows = [ca.reshape(each, 3, -1).T for each in (normals, *points)]
         radius = parameters[places[-1]]
@@ -214,16 +215,18 @@ class Convex(Body):
 
 def _of_hulls(vertices: Array, edge_radius: float, hull: Hull | None, core: Hull | None) -> Convex:
     """The body of some points whose hull and core are known; None of those that there are none of."""
-    counts = (len(hull.normals), len(core.corners), len(hull.edges)) if hull and core else None
-    made = object.__new__(_of_counts(*counts) if counts else Convex)
+    kind = Convex
+    if hull and core:
+        kind = _of_counts(len(hull.normals), len(core.corners), len(hull.edges), len(hull.corners))
+    made = object.__new__(kind)
     # All of it here: Python calls no `__init__` of what is not of the class that was asked for.
     vars(made).update(vertices=vertices, edge_radius=edge_radius, _hull=hull, _core=core)
     return made
 
 
 @cache
-def _of_counts(faces: int, corners: int, edges: int) -> type[Convex]:
-    """The class of polytopes of so many faces and edges, whose cores have so many corners."""
-    width = 4 * faces + 3 * corners + 6 * edges + 1
-    own = {"counts": (faces, corners, edges), "width": width, "__module__": __name__}
-    return type(f"Convex{faces}x{corners}x{edges}", (Convex,), own)
+def _of_counts(faces: int, corners: int, edges: int, tips: int) -> type[Convex]:
+    """The class of polytopes of so many faces, sharp edges and corners, whose cores have so many corners."""
+    counts, width = (faces, corners, edges, tips), 4 * faces + 3 * (corners + tips) + 6 * edges + 1
+    own = {"counts": counts, "width": width, "__module__": __name__}
+    return type(f"Convex{'x'.join(map(str, counts))}", (Convex,), own)

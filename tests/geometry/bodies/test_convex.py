@@ -29,7 +29,7 @@ PRISM = Convex(np.array([[np.cos(a), np.sin(a), z] for a in ANGLES for z in (-1,
 
 
 def test_a_box_is_a_box(rng: np.random.Generator) -> None:
-    assert SAME.counts == (6, 8, 12)
+    assert SAME.counts == (6, 8, 12, 8)
     for point in checks.around(CRATE, rng, 300):
         expected, found = CRATE.signed_distance(point), SAME.signed_distance(point)
         local = np.abs(CRATE.turn.T @ (point - CRATE.center)) - CRATE.size / 2
@@ -127,7 +127,7 @@ def test_a_task_file_gives_a_polytope() -> None:
     }
     shape = checks.shape_in_task(f"convex: {{vertices: {points}}}", refused)
     assert isinstance(shape.body, KINDS["convex"])
-    assert shape.body.counts == (6, 8, 12)
+    assert shape.body.counts == (6, 8, 12, 8)
     assert shape.edge_radius == pytest.approx(0.0002)
 
 
@@ -150,7 +150,7 @@ def test_a_face_has_the_bounds_of_its_sharp_edges_alone() -> None:
 def test_next_to_acute_edges_links_are_as_far_as_they_seem(rng: np.random.Generator) -> None:
     """By its faces alone, a link abreast of a blade's edge seems to be at less than half of its distance."""
     blade = Convex(np.array([[x, y, z] for z in (-1, 1) for x, y in ((0, 0), (-2, 0.5), (-2, -0.5))]), 0.01)
-    assert blade.counts == (5, 6, 9)
+    assert blade.counts == (5, 6, 9, 6)
     surface = type(blade).surface(ca.SX(blade.parameters))
     ends = [ca.SX.sym(name, 3) for name in ("start", "end")]
     distance = ca.Function("distance", ends, [core_distance(Segment(*ends), surface.core) - surface.radius])
