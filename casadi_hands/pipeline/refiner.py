@@ -148,7 +148,7 @@ class Refiner:
         planned: Design,
         halvings: int | None = None,
     ) -> Tried:
-        """Judge a refinement; where it is exact but between samples, halve intervals while it helps, as often as told."""
+        """Judge a refinement; where it is exact but between samples, halve intervals while that helps, so often."""
         judged = self._judged(stage.model, refined, short, planned)
         for _ in itertools.count() if halvings is None else range(halvings):
             # Fingers that pass through each other do so on any knots.

@@ -136,6 +136,7 @@ def test_what_is_farther_than_enough_need_not_be_found(rng: np.random.Generator)
             assert [a.tolist() for a in either] == [a.tolist() for a in exact]
         else:
             assert either[0] >= enough
+            assert not np.any(either[1]) or either[0] == exact[0]
     assert 20 < near < 180
 
 

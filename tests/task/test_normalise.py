@@ -92,6 +92,44 @@ def test_where_two_parts_meet_a_contact_is_on_a_face_of_one(second: str) -> None
     assert parse_task(task_to_yaml(task)) == task
 
 
+L_SHAPE = """\
+object:
+  mass: 0.1
+  shapes:
+    - box: {center: [0, 0, 0], size: [0.04, 0.03, 0.04]}
+    - box: {center: [0.04, 0, -0.01], size: [0.04, 0.03, 0.02]}
+palm: {position: [0, 0, 0.2], facing: [0, 0, -1]}
+motion: [{at: 0, position: [0, 0, 0]}, {at: 2, position: [0, 0, 0.01]}]
+fingers:
+  thumb: {touches: PLACE}
+  index: {touches: [0, -0.015, 0.001]}
+"""
+
+
+@pytest.mark.parametrize("place", [[0.02, 0, 0.0005], [0.0204, 0, 0], [0.02, 0.002, 0.003], [0.021, 0, 0]])
+def test_beside_an_inner_corner_contacts_stay_where_they_are(place: list[float]) -> None:
+    """One body ends there, and another begins, but its surface does not go on in the same way."""
+    task = parse_task(L_SHAPE.replace("PLACE", str(place)))
+    moved = np.array(task.fingers["thumb"].touches) - np.array(task.fingers["index"].touches)
+    assert moved == pytest.approx(np.array(place) - [0, -0.015, 0.001], abs=1e-4)
+
+
+def test_a_keel_where_parts_meet_stays_the_lowest_point() -> None:
+    half = [[x, y, z] for x in (-0.03, 0.03) for y, z in ((0.0, 0.0), (0.02, 0.01), (0.0, 0.02), (0.02, 0.02))]
+    other = [[x, -y, z] for x, y, z in half]
+    task = parse_task(
+        f"object: {{mass: 0.1, shapes: [{{convex: {{vertices: {half}}}}}, {{convex: {{vertices: {other}}}}}]}}\n"
+        "palm: {position: [0, 0, 0.2], facing: [0, 0, -1]}\n"
+        "motion: [{at: 0, position: [0, 0, 0]}, {at: 2, position: [0, 0, 0.01]}]\n"
+        "ground: {height: 0, touches: [0.001, 0, 0]}\n"
+        "fingers: {thumb: {touches: [0, 0.02, 0.015]}, index: {touches: [0, -0.02, 0.015]}}\n"
+    )
+    lowest = min(point[2] for shape in task.object.shapes for point in np.asarray(shape.vertices))
+    assert task.ground is not None
+    assert task.ground.touches[2] == pytest.approx(lowest, abs=5e-5)
+    assert task.ground.touches[1] == pytest.approx(0, abs=1e-4)
+
+
 def test_an_edge_of_the_object_stays_where_a_person_put_a_contact() -> None:
     given = SPLIT.replace("SECOND", BLOCK).replace("[0, 0.015, 0.001]", "[0.01, 0.015, 0.015]")
     task = parse_task(given)

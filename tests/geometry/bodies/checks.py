@@ -240,7 +240,7 @@ def check_links(
         body: of a size of about one.
         core: as coal has it.
         rng: where links are.
-        most: by how much all but a few may be too large, where the body's edges are round.
+        most: by how much all but a few may be off, where the body's edges are round.
         swept: what coal's body is larger by.
     """
     ends, parameters = [ca.SX.sym(name, 3) for name in ("start", "end")], ca.SX.sym("parameters", body.width)

@@ -10,6 +10,7 @@ import casadi as ca
 import coal
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.geometry.bodies import KINDS
@@ -20,6 +21,7 @@ from casadi_hands.geometry.hull import ALIKE, hull_of
 from casadi_hands.geometry.pairs import core_distance
 from tests.geometry.bodies import checks
 
+Array = NDArray[np.float64]
 CRATE = Box(np.array([0.1, -0.2, 0.3]), np.array([0.8, 1.4, 2.0]), np.array([0.3, -0.5, 0.9]), 0.01)
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * CRATE.size / 2
 SAME = Convex(CRATE.center + CORNERS @ CRATE.turn.T, 0.01)
@@ -86,6 +88,38 @@ def test_mass_properties_are_those_of_coal() -> None:
 @pytest.mark.parametrize("body", [SAME, PRISM, WEDGE], ids=["box", "prism", "wedge"])
 def test_the_distance_of_a_link_is_that_of_coal(body: Convex, rng: np.random.Generator) -> None:
     checks.check_links(body, _hull(body), rng, most=8e-3, swept=body.ball)
+
+
+CONE = np.vstack([[[np.cos(a), np.sin(a), 0] for a in 2 * np.pi * np.arange(64) / 64], [[0, 0, 0.5]]])
+SPIKE = np.vstack([CORNERS[CORNERS[:, 2] < 0] * 0.15, [[0, 0, 2]]])
+PLATE = CORNERS * [1, 1, 0.02]
+
+
+@pytest.mark.parametrize("points", [CONE, SPIKE, PLATE], ids=["cone", "spike", "plate"])
+def test_distances_are_right_beside_tips_and_thin_edges_too(points: Array, rng: np.random.Generator) -> None:
+    """A tip where blunt edges meet, and edges that planes of faces tell least of; far ones need not be found."""
+    body, enough = Convex(points, 1e-3), 0.3
+    surface = type(body).surface(ca.SX(body.parameters))
+    ends = [ca.SX.sym(name, 3) for name in ("start", "end")]
+    limits = None, ca.SX(enough)
+    cores = [core_distance(Segment(*ends), surface.core, limit) - float(body.edge_radius) for limit in limits]
+    function, near = ca.Function("distances", ends, cores), 0
+    for start, way in rng.uniform(-1, 1, (400, 2, 3)):
+        start = 1.3 * start + [0, 0, 0.5]
+        end = start + 0.7 * way
+        length = float(np.linalg.norm(end - start))
+        truth = checks.coal_distance(checks.along_z(coal.Capsule(1e-6, length), start, end), _hull(body)) + 1e-6
+        found, quick = (float(value) for value in function(start, end))
+        if truth <= 1e-6:
+            assert found < 1e-3
+        else:
+            assert found == pytest.approx(truth, abs=3e-3)
+        if found < enough - body.edge_radius:
+            assert quick == found
+            near += 1
+        else:
+            assert quick > enough - 2 * body.edge_radius
+    assert near > 30
 
 
 def test_it_travels() -> None:
