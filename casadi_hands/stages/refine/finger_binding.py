@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from casadi_hands.geometry.bodies import Body
 from casadi_hands.kinematics.singularity import MARGIN_SIZES
 from casadi_hands.nlp import Parameter, Rows
 from casadi_hands.problem.model import Model
@@ -13,6 +14,7 @@ from casadi_hands.stages.refine import finger_kernels as kernels
 from casadi_hands.stages.refine.declaration import FREE, IN_CONE, Bounds, Declaration, Knots
 
 Array = NDArray[np.float64]
+_SEAM = 1e-3  # lengths that bodies may be apart whose faces go on in one another
 LIFTED, RISING = 0.06, 0.2  # lengths that a finger which has let go stays off the object, and lengths/s until it does
 
 
@@ -142,8 +144,13 @@ def bind_clearance(of: Declaration, i: int) -> None:
     ) -> None:
         kernel = kernels.apart(n, model.kinds, skipped, model.ground is not None, bool(model.servo))
         lower = np.full((len(knots), kernel.constraints["clear"].numel()), least)
-        if lifted is not None:  # last of all are the last link's distances from the object's bodies
+        # Last of all are the last link's distances from the object's bodies, but for the one that it touches.
+        if lifted is not None:
             lower[:, -len(model.kinds) :] += lifted[:, None]
+        if skipped is not None:
+            others = [k for k in range(len(model.kinds)) if k != skipped]
+            adjoining = [_go_on(model.bodies[skipped], model.bodies[k]) for k in others]
+            lower[:, lower.shape[1] - len(others) :][:, adjoining] = 0.0
         of.bind(
             knots,
             kernel,
@@ -168,6 +175,17 @@ def bind_clearance(of: Declaration, i: int) -> None:
         halves = structure.middles.weights(idle)
         moving = {"pose": of.pose.combine(halves), "angles": of.angles[i].combine(halves)}
         bind("apart_between", idle, moving, of.between(idle), 0.0, None)
+
+
+def _go_on(one: Body, other: Body) -> bool:
+    """Whether the faces of one body may go on in another's, as those of a mesh's parts do.
+
+    Next to the seam what touches one is as near to the other as it can be.
+    """
+    if not (one.face_bounds and other.face_bounds):
+        return False
+    (low, high), (lower, upper) = one.bounding_box, other.bounding_box
+    return bool(np.all(low <= upper + _SEAM) and np.all(lower <= high + _SEAM))
 
 
 def lifted_clearance(touching: NDArray[np.bool_], times: Array) -> Array:

@@ -8,10 +8,13 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from casadi_hands.geometry.bodies import packed
 from casadi_hands.problem.resampling import resampled_model
+from casadi_hands.problem.si import build_model
 from casadi_hands.problem.structure import Inner, Structure
 from casadi_hands.stages.object_motion.values import tool_path
 from casadi_hands.stages.refine import finger_kernels
 from casadi_hands.stages.refine.settings import WEIGHTS
+from casadi_hands.stages.refine.stage import RefineStage
+from casadi_hands.task import parse_task
 from tests.stages.blocks import frames, numbers, surface
 from tests.stages.example import check_derivatives, doubling_each_weight, drawing, everything, rod, with_tips
 from tests.stages.refining import MadeUp, carrying, sketching
@@ -289,3 +292,26 @@ def test_every_weight_moves_its_own_term(case: MadeUp) -> None:
 def test_derivatives_agree_with_differences(case: MadeUp) -> None:
     weights = {name: WEIGHTS[name] for name in case.stage.problem.terms}
     check_derivatives(case.stage.solver, case.values, case.parameters(weights))
+
+
+def test_what_touches_one_part_may_be_as_near_to_those_that_it_goes_on_in() -> None:
+    """Next to a seam there is no way to be clear of the other part; bodies of no faces, and far ones, stay clear."""
+    box = "box: {center: [%g, 0, 0], size: [0.04, 0.03, 0.03]}"
+    ball = "sphere: {center: [-0.02, 0, 0.02], radius: 0.012}"
+    shapes = ", ".join(f"{{{each}}}" for each in (box % -0.02, box % 0.02, box % 0.07, ball))
+    task = parse_task(
+        f"object: {{mass: 0.1, shapes: [{shapes}]}}\n"
+        "palm: {position: [0, 0, 0.2], facing: [0, 0, -1]}\n"
+        "motion: [{at: 0, position: [0, 0, 0]}, {at: 1, position: [0, 0, 0.01]}]\n"
+        "fingers: {thumb: {touches: [-0.02, 0.015, 0]}, index: {touches: [0.02, -0.015, 0]}}\n"
+        "hand: {clearance: 0.001}\n"
+    )
+    model = build_model(task)
+    active = np.ones((len(model.schedule.samples), 2), bool)
+    problem = RefineStage(model, (0, 1), (1, 1), active).problem
+    bounds = problem.constraint_lower[problem.constraint_rows["apart_touching0.clear"]]
+    far = model.clearance
+    assert far > 0
+    # The other box of the same block, that which stands apart, and the ball.
+    np.testing.assert_allclose(bounds[:, -3:], np.tile([0, far, far], (len(bounds), 1)))
+    assert np.all(bounds[:, :-3] == far)
