@@ -243,3 +243,9 @@ def test_a_motion_of_another_hand_is_refused(saved):
     edit(saved, hand=result["hand"])
     with pytest.raises(DesignError, match="moves other joints"):
         Design.load(saved)
+
+
+def test_a_motion_of_joints_without_a_hand_is_refused(saved):
+    edit(saved, hand=None)
+    with pytest.raises(DesignError, match=r"moves joints, and result\.json has no hand"):
+        Design.load(saved)

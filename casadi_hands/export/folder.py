@@ -139,8 +139,14 @@ def _read(directory: Path) -> dict[str, Any]:
     except DesignError as error:
         raise DesignError(f"{directory / 'result.json'}: {error}") from error
     motion = load_motion(directory / "motion.npz", task) if record["samples"] is not None else None
-    if hand is not None and motion is not None and motion.joint_names != hand.joint_names:
-        raise DesignError(f"{directory}: motion.npz moves other joints than those of the hand in result.json")
+    joints = () if hand is None else hand.joint_names
+    if motion is not None and motion.joint_names != joints:
+        which = (
+            "joints, and result.json has no hand"
+            if hand is None
+            else "other joints than those of the hand in result.json"
+        )
+        raise DesignError(f"{directory}: motion.npz moves {which}")
     return dict(
         task=task,
         status=record["status"],
