@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 from dataclasses import replace
@@ -144,6 +145,19 @@ def test_an_object_that_no_hand_touches_is_not_certified(
 def test_what_says_the_same_stays_certified(bad: Path, vary: Falsify) -> None:
     vary(bad)
     assert refusal(bad) == ""
+
+
+@pytest.mark.parametrize("kind", ["pipe", "device", "folder", "link to nothing"])
+def test_a_table_that_is_no_file_is_not_passed_over(bad: Path, kind: str) -> None:
+    table = bad / "motion.csv"
+    table.unlink()
+    if kind == "pipe":
+        os.mkfifo(table)
+    elif kind == "folder":
+        table.mkdir()
+    else:
+        table.symlink_to("/dev/zero" if kind == "device" else "nowhere")
+    assert "motion.csv" in refusal(bad)
 
 
 def test_a_trusted_task_judges_and_says_what_the_folder_says_otherwise(good: Path, bad: Path, tmp_path: Path) -> None:

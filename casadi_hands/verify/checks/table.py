@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import os
 
 import numpy as np
 
@@ -30,7 +31,7 @@ def table_problems(folder: Folder) -> list[str]:
         DesignError: it is no table of numbers.
     """
     path = folder.path / "motion.csv"
-    if not path.is_file():
+    if not os.path.lexists(path):
         return []
     try:
         names, *rows = csv.reader(io.StringIO(read_text(path), newline=""))
