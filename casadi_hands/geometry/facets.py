@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from casadi_hands.geometry.bodies.body import Core
+from casadi_hands.geometry.core import Core
 from casadi_hands.geometry.segments import nearest_points, segment_distance
 from casadi_hands.geometry.smooth import constant, norm
 

@@ -9,9 +9,9 @@ from typing import Any
 import casadi as ca
 from casadi import MX, SX, Function
 
-from casadi_hands.geometry.bodies.body import Core, Placed
 from casadi_hands.geometry.bodies.capsule import Segment
 from casadi_hands.geometry.bodies.sphere import Point
+from casadi_hands.geometry.core import Core, Placed
 from casadi_hands.geometry.segments import point_segment_distance, segment_distance
 from casadi_hands.geometry.smooth import clamp, constant, norm
 

@@ -4,7 +4,8 @@ import math
 from importlib import import_module
 from pkgutil import iter_modules
 
-from casadi_hands.geometry.bodies.body import Body, Core, Solid, Surface, packed, surfaces, width_of
+from casadi_hands.geometry.bodies.body import Body, Solid, Surface, packed, surfaces, width_of
+from casadi_hands.geometry.core import Core
 
 for _module in iter_modules(__path__):
     import_module(f"{__name__}.{_module.name}")

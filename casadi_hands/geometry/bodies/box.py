@@ -12,7 +12,8 @@ import numpy as np
 from casadi import SX
 from scipy.spatial.transform import Rotation
 
-from casadi_hands.geometry.bodies.body import TILT, Array, Body, Core, Solid, Surface, edge_metadata, farthest
+from casadi_hands.geometry.bodies.body import TILT, Array, Body, Solid, Surface, edge_metadata, farthest
+from casadi_hands.geometry.core import Core
 from casadi_hands.geometry.smooth import norm
 
 _KINK = 1e-3  # rounding of corners, a share of the half sides, and lengths

@@ -10,7 +10,8 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from casadi_hands.geometry.bodies.body import Array, Body, Core, Solid, Surface, farthest
+from casadi_hands.geometry.bodies.body import Array, Body, Solid, Surface, farthest
+from casadi_hands.geometry.core import Core
 from casadi_hands.geometry.smooth import norm
 
 # The normal turns a corner where cap and cylinder meet, and contacts like to sit there: an optimiser jams on it. The

@@ -9,7 +9,8 @@ from typing import ClassVar, Self
 import numpy as np
 from casadi import SX
 
-from casadi_hands.geometry.bodies.body import Array, Body, Core, Solid, Surface
+from casadi_hands.geometry.bodies.body import Array, Body, Solid, Surface
+from casadi_hands.geometry.core import Core
 
 
 @dataclass(frozen=True)
