@@ -19,18 +19,20 @@ def segment_distance(start: SX, end: SX, other_start: SX, other_end: SX) -> SX:
     rounded off at zero. It is never too small, and too large by at most 1e-4 of the summed lengths where segments
     are 0.3 or more apart, by 1e-3 where they nearly touch and are nearly parallel.
     """
-    s, t = _shares(start, end, other_start, other_end)
-    return norm(start - other_start + s * (end - start) - t * (other_end - other_start), _ROUNDING)
+    along, other_along, between = end - start, other_end - other_start, start - other_start
+    s, t = _shares(along, other_along, between)
+    return norm(between + s * along - t * other_along, _ROUNDING)
 
 
 def nearest_points(start: SX, end: SX, other_start: SX, other_end: SX) -> tuple[SX, SX]:
     """The closest points (3,) of two segments, as `segment_distance` takes them."""
-    s, t = _shares(start, end, other_start, other_end)
-    return start + s * (end - start), other_start + t * (other_end - other_start)
+    along, other_along = end - start, other_end - other_start
+    s, t = _shares(along, other_along, start - other_start)
+    return start + s * along, other_start + t * other_along
 
 
-def _shares(start: SX, end: SX, other_start: SX, other_end: SX) -> tuple[SX, SX]:
-    along, other_along, between = end - start, other_end - other_start, start - other_start
+def _shares(along: SX, other_along: SX, between: SX) -> tuple[SX, SX]:
+    """Of two segments, each as a vector (3,), at which their closest points are; ``between`` (3,) their starts."""
     length2, other_length2 = ca.sumsqr(along), ca.sumsqr(other_along)
     tie = _TIE * (length2 + other_length2) + 1e-9
     a, b, e = length2 + tie, ca.dot(along, other_along), other_length2 + tie

@@ -54,9 +54,8 @@ def links_and_object(
     found = []
     for (start, end), radius in zip(ends, radii, strict=True):
         for body in bodies:
-            radii_of_both = radius + body.radius
-            enough = None if margin is None else margin + radii_of_both + _ROUNDING
-            found.append(core_distance(Segment(start, end), body.core, enough) - radii_of_both)
+            enough = None if margin is None else margin + radius + body.radius + _ROUNDING
+            found.append(core_distance(Segment(start, end), body.core, enough) - radius - body.radius)
     return ca.vertcat(*found)
 
 
