@@ -66,7 +66,7 @@ class Core(ABC):
 
 @dataclass(frozen=True)
 class Placed(Core):
-    """A core in another frame than its own.
+    """A core in another frame than its own; distances from links are found in that, see `pairs.core_distance`.
 
     Attributes:
         core: in its own frame.
@@ -86,24 +86,10 @@ class Placed(Core):
         """See `Core`."""
         return ca.mtimes(self.turn, self.core.offset(self.own(point)))
 
-    def depth(self, point: SX) -> SX:
-        """See `Core`."""
-        return self.core.depth(self.own(point))
-
     def distance_and_normal(self, point: SX, rounding: float) -> tuple[SX, SX]:
         """See `Core`."""
         distance, normal = self.core.distance_and_normal(self.own(point), rounding)
         return distance, ca.mtimes(self.turn, normal)
-
-    def slopes(self, start: SX, along: SX) -> Callable[[SX], SX]:
-        """See `Core`."""
-        return self.core.slopes(self.own(start), ca.mtimes(self.turn.T, along))
-
-    def mapped(self, placed: Callable[[SX], SX]) -> Placed:
-        """See `Core`."""
-        origin = placed(self.origin)
-        axes = [placed(self.origin + self.turn[:, k]) - origin for k in range(3)]
-        return Placed(self.core, origin, ca.horzcat(*axes))
 
     def marks(self, up: SX) -> list[SX]:
         """See `Core`."""

@@ -28,7 +28,7 @@ class Facets(Core):
         reaches: (F, 1) of the faces' planes along them, moved so that the surface goes through the faces' middles.
         corners: (V, 3) of the core.
         edge: radius of the rounded edges.
-        tips: (W, 3) corners of the polytope itself.
+        vertices: (W, 3) corners of the polytope itself.
         starts: (E, 3) of its sharp edges.
         ends: (E, 3) of those.
     """
@@ -37,7 +37,7 @@ class Facets(Core):
     reaches: SX
     corners: SX
     edge: SX
-    tips: SX
+    vertices: SX
     starts: SX
     ends: SX
 
@@ -52,7 +52,7 @@ class Facets(Core):
         between = ca.vertcat(*nearest_points(start, end, nearest[:3], nearest[3:]))
         way = between[:3] - between[3:]
         way /= norm(way, 1e-9)
-        apart = ca.fmin(ca.dot(way, start), ca.dot(way, end)) - ca.mmax(ca.mtimes(self.tips, way))
+        apart = ca.fmin(ca.dot(way, start), ca.dot(way, end)) - ca.mmax(ca.mtimes(self.vertices, way))
         return apart + self.edge, segment_distance(start, end, nearest[:3], nearest[3:]) + self.edge
 
     def _weighed(self, beyond: SX) -> tuple[SX, SX, SX]:
@@ -85,9 +85,9 @@ class Facets(Core):
 
     def bound(self) -> tuple[SX, SX]:
         """See `Core`."""
-        count = self.tips.shape[0]
-        center = ca.sum1(self.tips) / count
-        return center.T, ca.sqrt(ca.mmax(ca.sum2((self.tips - ca.repmat(center, count, 1)) ** 2)))
+        count = self.vertices.shape[0]
+        center = ca.sum1(self.vertices) / count
+        return center.T, ca.sqrt(ca.mmax(ca.sum2((self.vertices - ca.repmat(center, count, 1)) ** 2)))
 
     def offset(self, point: SX) -> SX:
         """See `Core`."""

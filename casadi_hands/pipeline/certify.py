@@ -93,18 +93,20 @@ class Certifier:
             self.record.log("synthesis", f"another joint for {', '.join(sorted(failing)) or 'the fingers with fewest'}")
             found = run_search(self.record, self.model, self.search, least)
 
-    def certify(self, candidate: Candidate, margin: Margin | None = None, grips: bool = True) -> tuple[Design, Refined]:
+    def certify(
+        self, candidate: Candidate, margin: Margin | None = None, thorough: bool = True
+    ) -> tuple[Design, Refined]:
         """Find a hand's motion and refine it; where contacts cannot go with the object, from a shorter one on.
 
         Args:
             candidate: the hand.
             margin: the first to be tried; by default what suits the hand.
-            grips: whether other grips are tried where replays fail.
+            thorough: whether much is tried where the audit or replays refuse it, see `Refiner.certify`.
 
         Returns:
             the design, replayed where its files hold, and its refinement.
         """
-        return self._refined(self._moved(candidate), (), margin, grips)
+        return self._refined(self._moved(candidate), (), margin, thorough)
 
     def _clear_first(self, candidates: Iterable[Candidate]) -> Iterator[tuple[Candidate, WholeHand]]:
         """Hands and their motions, one by one; last those whose fingers pass through each other on their way.
@@ -139,11 +141,11 @@ class Certifier:
         return run_whole_hand(self.record, model, floating, candidate)
 
     def _refined(
-        self, whole: WholeHand, short: tuple[Reason, ...], margin: Margin | None = None, grips: bool = True
+        self, whole: WholeHand, short: tuple[Reason, ...], margin: Margin | None = None, thorough: bool = True
     ) -> tuple[Design, Refined]:
         """A hand refined from the homotopy parameter of its motion on; ``short``: what its fingers could not do."""
         _, _, homotopy = self._begun
-        return self.refiner.certify(whole, short, margin, homotopy=homotopy, grips=grips)
+        return self.refiner.certify(whole, short, margin, homotopy=homotopy, thorough=thorough)
 
     @cached_property
     def _begun(self) -> tuple[Model, Floating, float]:

@@ -57,7 +57,7 @@ class Refiner:
         margin: Margin | None = None,
         near: bool = False,
         homotopy: float = 1.0,
-        grips: bool = True,
+        thorough: bool = True,
     ) -> tuple[Design, Refined]:
         """Refine one hand with a margin, and with others where that fails.
 
@@ -72,19 +72,19 @@ class Refiner:
             margin: the first to be tried; by default what suits the hand.
             near: whether the motion is nearly exact already.
             homotopy: the homotopy parameter that its motion goes to: 1 at its goals.
-            grips: whether others are tried where the audit refuses it, or replays fail of one that it refuses; else
+            thorough: whether other margins and ever more samples are tried where the audit or replays refuse it; else
                 little time is spent on it, as on a hand that would only take the place of a certified one.
 
         Returns:
             the design, replayed where its files hold, and its refinement.
         """
         planned, margins = self.record.design, margins_for(self.model, whole)
-        halvings = None if grips else 1
+        halvings = None if thorough else 1
         margin, largest = margin or margins.ample, margins.larger
         refined, stage = self._exact(whole, margin, near, homotopy, largest)
         found = self._between(whole, refined, stage, short, planned, halvings)
         judged, refined, stage = self._borne(whole, found, short, planned, halvings)
-        if grips and refined.exact and judged.status != "certified" and not stage.passes_through(refined):
+        if thorough and refined.exact and judged.status != "certified" and not stage.passes_through(refined):
             # Where joints barely push, fingers may fold over in an instant: other forces take them another way.
             margin, which = (margins.ample, "smaller") if refined.margin == largest else (largest, "larger")
             if judged.missed & {"least_stiffness", "torque", *BORNE}:  # which ask for less, the less fingers press
@@ -101,7 +101,7 @@ class Refiner:
         if judged.least_stiffness > HARDLY * self.record.task.actuator.stiffness or judged.share_of_torque > STRAINED:
             (another, which), between, other_way = (margins.softer, "softer"), softer, firmer
         best, enough = (judged, refined), not judged.drops and judged.replay_angle <= AIM
-        enough |= not grips and judged.status != "certified"
+        enough |= not thorough and judged.status != "certified"
         for _ in range(0 if enough else 2):
             if refined.margin == another:
                 break

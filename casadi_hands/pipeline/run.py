@@ -270,7 +270,7 @@ def _certified(certifier: Certifier, found: Found) -> Design:
     margin = cache(lambda: kept_margin(design))  # only where another hand is tried
 
     def certify(candidate: Candidate) -> Design:
-        return certifier.certify(candidate, margin=margin(), grips=False)[0]
+        return certifier.certify(candidate, margin=margin(), thorough=False)[0]
 
     return Pruner(certifier.record, certifier.search, certify, spare, certifier.failed).run(design)
 

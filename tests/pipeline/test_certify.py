@@ -90,8 +90,8 @@ class Loop(Certifier):
         active = np.ones((len(self.model.schedule.samples), 2), bool)
         return SimpleNamespace(contacts=(0, 1), active=active, joints=candidate.joints, trial=candidate.trial)
 
-    def _verdict(self, whole: Any, short: Any, margin: Any, homotopy: float, grips: bool) -> tuple[Design, Any]:
-        assert (margin, homotopy, grips) == (None, 1.0, True)
+    def _verdict(self, whole: Any, short: Any, margin: Any, homotopy: float, thorough: bool) -> tuple[Design, Any]:
+        assert (margin, homotopy, thorough) == (None, 1.0, True)
         missed, contacts, slips = self.verdicts[len(self.tried)]
         self.tried.append(whole.joints)
         refined = SimpleNamespace(
@@ -371,7 +371,7 @@ def refine(
     angles: Sequence[float] = (),
     missed: Sequence[str] = (),
     off: list[float] | None = None,
-    grips: bool = True,
+    thorough: bool = True,
 ) -> tuple[Margin, int]:
     """The margin of what is kept and its drops, where designs and drops are judged as told, in this order.
 
@@ -410,7 +410,7 @@ def refine(
     record, judging = Record(ball_task(), None, lambda _: None), SimpleNamespace(audited=lambda _: None)
     model = replace(build_model(ball_task()), torsion=float(soft))
     refiner = Refiner(record, model, judging, 1)  # type: ignore[arg-type]
-    design, refined = refiner.certify(whole, (), homotopy=homotopy, grips=grips)
+    design, refined = refiner.certify(whole, (), homotopy=homotopy, thorough=thorough)
     assert (next(judged, None), next(dropped, None)) == (None, None)
     if off is not None:
         off.append(design.replay_angle)
@@ -433,36 +433,36 @@ def test_a_firmer_grip_is_tried_where_replays_drop_and_kept_where_they_drop_less
 
 def test_where_a_hand_is_one_of_several_that_may_do_no_other_grip_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
     ways = Ways(firm=False)
-    assert refine(monkeypatch, ways, 1.0, ["certified"], [4], grips=False) == (AMPLE, 4)
+    assert refine(monkeypatch, ways, 1.0, ["certified"], [4], thorough=False) == (AMPLE, 4)
     assert ways.asked == [("solve", AMPLE)]
     # One that is certified may grip better.
     ways = Ways(firm=False)
-    assert refine(monkeypatch, ways, 1.0, ["certified"] * 2, [1, 0], grips=False) == (LARGE, 0)
+    assert refine(monkeypatch, ways, 1.0, ["certified"] * 2, [1, 0], thorough=False) == (LARGE, 0)
 
 
-@pytest.mark.parametrize("grips", [True, False])
+@pytest.mark.parametrize("thorough", [True, False])
 def test_little_is_tried_of_a_hand_that_would_only_take_anothers_place(
-    monkeypatch: pytest.MonkeyPatch, grips: bool
+    monkeypatch: pytest.MonkeyPatch, thorough: bool
 ) -> None:
     ways = Ways(firm=False)
-    judged = ["feasible"] * (2 if grips else 1)
-    assert refine(monkeypatch, ways, 1.0, judged, [], missed=["least_stiffness"], grips=grips) == (AMPLE, 0)
+    judged = ["feasible"] * (2 if thorough else 1)
+    assert refine(monkeypatch, ways, 1.0, judged, [], missed=["least_stiffness"], thorough=thorough) == (AMPLE, 0)
     assert ways.asked == [("solve", AMPLE), ("with_margin", SOFT)][: len(judged)]
 
 
-@pytest.mark.parametrize("grips", [True, False])
-def test_of_such_a_hand_intervals_are_halved_once(monkeypatch: pytest.MonkeyPatch, grips: bool) -> None:
+@pytest.mark.parametrize("thorough", [True, False])
+def test_of_such_a_hand_intervals_are_halved_once(monkeypatch: pytest.MonkeyPatch, thorough: bool) -> None:
     left = iter([True, True, True, False])
     monkeypatch.setattr(refiner_module, "intervals_to_halve", lambda *_: np.full(6, next(left)))
     monkeypatch.setattr(refiner_module, "resampled_model", lambda model, _: model)
     monkeypatch.setattr(refiner_module, "resampled", lambda hand, *_: hand)
     monkeypatch.setattr(refiner_module, "GAIN", 2.0)  # each halving is a gain
     ways = Ways(firm=False)
-    if grips:
+    if thorough:
         refine(monkeypatch, ways, 1.0, [*["feasible"] * 4, "certified"], [0], missed=["residual"])
         assert [name for name, _ in ways.asked] == ["solve", *["renew"] * 3, "with_margin"]
     else:
-        refine(monkeypatch, ways, 1.0, ["feasible"] * 2, [], missed=["residual"], grips=False)
+        refine(monkeypatch, ways, 1.0, ["feasible"] * 2, [], missed=["residual"], thorough=False)
         assert [name for name, _ in ways.asked] == ["solve", "renew"]
 
 
@@ -471,10 +471,10 @@ def test_what_links_bear_is_a_limit_only_where_nothing_else_is_in_the_way(
     monkeypatch: pytest.MonkeyPatch, missed: list[str]
 ) -> None:
     ways = Ways(firm=False)
-    refine(monkeypatch, ways, 1.0, ["feasible"] * 2, [], missed=missed, grips=False)
+    refine(monkeypatch, ways, 1.0, ["feasible"] * 2, [], missed=missed, thorough=False)
     assert [name for name, _ in ways.asked] == ["solve", "with_margin"]
     ways = Ways(firm=False)
-    refine(monkeypatch, ways, 1.0, ["feasible"], [], missed=[*missed, "friction"], grips=False)
+    refine(monkeypatch, ways, 1.0, ["feasible"], [], missed=[*missed, "friction"], thorough=False)
     assert [name for name, _ in ways.asked] == ["solve"]
 
 

@@ -274,8 +274,8 @@ def test_joints_are_spared_where_each_has_a_motor_and_none_must_roll_far(
     task = ball_task().model_copy(update={"motors": motors})
     found, asked, told = Design(task, "certified"), list[tuple[Any, ...]](), list[Any]()
 
-    def certify(candidate: Any, margin: Any, grips: bool) -> tuple[str, None]:
-        asked.append((candidate, margin, grips))
+    def certify(candidate: Any, margin: Any, thorough: bool) -> tuple[str, None]:
+        asked.append((candidate, margin, thorough))
         return "design", None
 
     class Pruner:

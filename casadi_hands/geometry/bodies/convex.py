@@ -84,8 +84,8 @@ class Convex(Body):
     @classmethod
     def surface(cls, parameters: SX) -> Surface:
         """See `Body`."""
-        faces, corners, edges, tips = cls.counts
-        places = np.cumsum([0, 3 * faces, faces, 3 * corners, 3 * tips, 3 * edges, 3 * edges]).tolist()
+        faces, corners, edges, vertices = cls.counts
+        places = np.cumsum([0, 3 * faces, faces, 3 * corners, 3 * vertices, 3 * edges, 3 * edges]).tolist()
         normals, reaches, *points = (parameters[a:b] for a, b in itertools.pairwise(places))
         rows = [ca.reshape(each, 3, -1).T for each in (normals, *points)]
         radius = parameters[places[-1]]
@@ -225,8 +225,8 @@ def _of_hulls(vertices: Array, edge_radius: float, hull: Hull | None, core: Hull
 
 
 @cache
-def _of_counts(faces: int, corners: int, edges: int, tips: int) -> type[Convex]:
+def _of_counts(faces: int, corners: int, edges: int, vertices: int) -> type[Convex]:
     """The class of polytopes of so many faces, sharp edges and corners, whose cores have so many corners."""
-    counts, width = (faces, corners, edges, tips), 4 * faces + 3 * (corners + tips) + 6 * edges + 1
+    counts, width = (faces, corners, edges, vertices), 4 * faces + 3 * (corners + vertices) + 6 * edges + 1
     own = {"counts": counts, "width": width, "__module__": __name__}
     return type(f"Convex{'x'.join(map(str, counts))}", (Convex,), own)
