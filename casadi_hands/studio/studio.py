@@ -22,7 +22,7 @@ from casadi_hands.studio.panel import Later, Panel
 from casadi_hands.studio.places import Place, moved, places, removed, with_finger, with_goal
 from casadi_hands.studio.results import Results
 from casadi_hands.studio.session import Session
-from casadi_hands.studio.window import View, fit
+from casadi_hands.studio.window import View, arrange
 from casadi_hands.task import Task
 
 _NOTHING = "nothing"
@@ -54,11 +54,9 @@ class Studio:
         self._add_moves(gui)
         self.results = Results(server, out, command, self._before_solve)
         self._panel = Panel(gui, self._type_field)
-        gui.main_panel.dock_right()
-        gui.main_panel.set_width(360)
         self._show()
         view = self._view()
-        server.on_client_connect(lambda client: fit(client, self._file_panel, view))
+        server.on_client_connect(lambda client: arrange(client, self._file_panel, view))
 
     def close(self) -> None:
         """Stop what runs."""
@@ -79,8 +77,6 @@ class Studio:
                 hint="Write the file, as solving does, too; take the last change back; read the file.",
             )
             self._text = gui.add_text("", self.session.text, multiline=True)
-        panel.dock_left()
-        panel.set_width(430)
         buttons.on_click(lambda _: self._do(does[buttons.value]))
 
         def take(event: Any) -> None:

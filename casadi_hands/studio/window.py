@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-import time
+import threading
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +14,6 @@ PHONE = 576
 NARROW = 1200
 """px; in windows narrower than this the file's panel is folded up, to leave room for the scene."""
 _SHEET = 0.5
-_SETTLES = 5.0  # s in which panels find their places
 
 
 @dataclass(frozen=True)
@@ -49,31 +48,50 @@ def placed(view: View, fov: float, size: tuple[int, int], sheet: bool) -> tuple[
     return middle + distance * view.towards, middle
 
 
-def fit(client: Any, panel: Any, view: View | None) -> None:
+def arrange(client: Any, panel: Any, view: View | None) -> None:
     """Arrange a page that was just opened for the size of its window.
 
     Args:
-        client: viser's, of the page; its scene is as large as the window, until its panels have their places.
-        panel: viser's, that is folded up where there is little room.
+        client: viser's, of the page; no panel has its place yet, so that its scene is as wide as the window.
+        panel: viser's, of the task's file, which is folded up where there is little room.
         view: what the camera shall see; None leaves it.
     """
-    width, size = client.camera.image_width, (0, 0)
+    width = client.camera.image_width
+    if view is not None:
+        follow = _Follow(client, view, width <= PHONE)
+        client.camera.on_update(follow)
+        follow(client.camera)
+    main, file = client.gui.main_panel, client.gui.main_panel
+    file._placement_uuid = panel._placement_uuid  # viser lets a page place none but its main panel
+    main.dock_right()
+    main.set_width(360)
+    file.dock_left()
+    file.set_width(430)
     if PHONE < width < NARROW:
-        _fold(client, panel)
-    end = time.monotonic() + _SETTLES
-    while view is not None and time.monotonic() < end:
-        now = (client.camera.image_width, client.camera.image_height)
-        if now != size and min(now) > 0:
-            size = now
-            position, middle = placed(view, client.camera.fov, size, width <= PHONE)
-            with client.atomic():
-                client.camera.position = position  # takes along where it looks
-                client.camera.look_at = middle
-        time.sleep(0.1)
+        file.minimize()
 
 
-def _fold(client: Any, panel: Any) -> None:
-    """Fold up a panel of all pages on this one; viser lets a page place none but the main panel."""
-    handle = client.gui.main_panel
-    handle._placement_uuid = panel._placement_uuid
-    handle.minimize()
+class _Follow:
+    """Places a page's camera anew where its scene has another size, until someone moves the camera."""
+
+    def __init__(self, client: Any, view: View, sheet: bool) -> None:
+        self._client, self._view, self._sheet = client, view, sheet
+        self._lock = threading.Lock()
+        self._size = (0, 0)
+        self._known = [np.array(client.camera.position)]
+        """Where the camera has been by itself, (3,) each."""
+        self._moved = False
+
+    def __call__(self, camera: Any) -> None:
+        with self._lock:
+            size, position = (camera.image_width, camera.image_height), camera.position
+            near = 1e-3 * self._view.reach
+            self._moved |= all(np.linalg.norm(position - each) > near for each in self._known)
+            if self._moved or size == self._size or min(size) <= 0:
+                return
+            self._size = size
+            position, middle = placed(self._view, camera.fov, size, self._sheet)
+            self._known.append(position)
+            with self._client.atomic():
+                camera.position = position  # takes along where it looks
+                camera.look_at = middle
