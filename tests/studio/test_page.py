@@ -45,6 +45,22 @@ def picture(browser, path):
     return iio.imread(path)[..., :3].astype(int)
 
 
+def settled(browser, path, unlike=None):
+    """The picture once it stays what it is, which is neither blank nor like another."""
+    before = picture(browser, path)
+
+    def stays():
+        nonlocal before
+        time.sleep(0.3)
+        now = picture(browser, path)
+        same, before = np.array_equal(now, before), now
+        blank = len(np.unique(now @ [1 << 16, 1 << 8, 1])) <= 200
+        return same and not blank and (unlike is None or (np.abs(now - unlike).sum(axis=2) > 60).sum() > 100)
+
+    until(stays, 60.0)
+    return before
+
+
 def until(found, seconds=30.0):
     end = time.monotonic() + seconds
     while not (value := found()):
@@ -57,14 +73,11 @@ def test_the_page_edits_the_file_and_asks_nobody_else(studio, browser, tmp_path)
     page, address = studio
     browser.open(address)
     assert browser.wait('document.querySelector("textarea")?.value') == CAPSULE
-    time.sleep(4)  # the picture comes a little later
-    before = picture(browser, tmp_path / "before.png")
-    assert len(np.unique(before.reshape(-1, 3), axis=0)) > 200  # not a blank page
+    before = settled(browser, tmp_path / "before.png")
 
     # A gizmo: its upward arrow is what is blue now and was not.
     page.choose(("motion", 1))
-    time.sleep(2)
-    after = picture(browser, tmp_path / "gizmo.png")
+    after = settled(browser, tmp_path / "gizmo.png", before)
     blue = (after[..., 2] - after[..., 0] > 40) & (np.abs(after - before).sum(axis=2) > 60)
     blue[:, :440] = blue[:, 1070:] = False
     rows, columns = np.nonzero(blue)
@@ -129,11 +142,14 @@ def test_a_hand_that_comes_is_shown_and_moves(studio, browser, tmp_path):
     browser.wait('document.querySelector("textarea")?.value')
     example_design().save(tmp_path / "result")
     browser.wait('document.body.innerText.includes("made by hand")')
-    page.results.show_hand()
-    time.sleep(3)
-    one = picture(browser, tmp_path / "one.png")
-    time.sleep(0.7)
-    other = picture(browser, tmp_path / "other.png")
     middle = np.s_[200:700, 450:1060]
-    assert (np.abs(one - other)[middle].sum(axis=2) > 60).sum() > 200
+    still = settled(browser, tmp_path / "still.png")[middle]
+    page.results.show_hand()
+
+    def changed(from_what):
+        return (np.abs(from_what - picture(browser, tmp_path / "now.png")[middle]).sum(axis=2) > 60).sum() > 200
+
+    until(lambda: changed(still))
+    one = picture(browser, tmp_path / "one.png")[middle]
+    until(lambda: changed(one))
     assert browser.problems == []
