@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from casadi_hands.task import Ground, Task
 
 _TIME_STEP = 0.001  # s
+_IMPRATIO, _NO_SLIP = "100", "20"  # harder friction changes nothing any more (``scripts/creep.py``)
 _USUAL_FORCE = 2.0  # weights with which contacts press: where more, they are stiffer
 _SOFTNESS = 0.02  # depth over which a contact stiffens, of the characteristic length
 _STILL = 1e-9  # a palm that moves less, relative to its size (or in its quaternion), stands still
@@ -129,8 +130,8 @@ def _add_settings(root: Element, task: Task, force: float) -> None:
         gravity=numbers(task.gravity),
         integrator="implicitfast",
         cone="elliptic",
-        impratio="10",
-        noslip_iterations="5",
+        impratio=_IMPRATIO,
+        noslip_iterations=_NO_SLIP,
     )
     extent = 8 * task.object.characteristic_length
     center = task.palm.position
