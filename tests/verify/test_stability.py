@@ -288,8 +288,10 @@ ground: {{height: 0}}
 """
 
 
+@pytest.mark.parametrize("sticks", [True, False])
 @pytest.mark.parametrize("tilt", [0.0, 5.0])
-def test_a_bar_that_lies_on_the_ground_rolls_and_does_not_tip(tmp_path: Path, tilt: float) -> None:
+def test_a_bar_that_lies_on_the_ground_rolls_and_does_not_tip(tmp_path: Path, tilt: float, sticks: bool) -> None:
+    """Where it does not stick it slides and tips, and cannot leave the ground all the same."""
     task = read_task(tmp_path, GROUNDED.format(height=0.02 + 0.04 * np.sin(np.deg2rad(tilt))))
     scene = plain(task, TIME)
     active = np.tile([False, False, True], (11, 1))
@@ -310,9 +312,59 @@ def test_a_bar_that_lies_on_the_ground_rolls_and_does_not_tip(tmp_path: Path, ti
         ).write(tmp_path / "result")
     )
     stability = Stability(folder)
-    rows, _, _ = stability.rows(0)
+    rows, _, _ = stability.rows(0, sticks)
     free = null_space(rows / np.r_[np.full(3, 0.06), np.ones(rows.shape[1] - 3)])[:6]
     palm = Rotation.from_quat(folder.motion.base_orientation[0], scalar_first=True)
     spins = np.linalg.matrix_rank(palm.apply(free[3:].T)[:, 1:2], tol=1e-6)
     # About y, across its axis: not while it lies flat.
-    assert spins == (1 if tilt else 0)
+    assert spins == (1 if tilt or not sticks else 0)
+    still = free @ null_space(free[3:]) if free.shape[1] > 3 else np.zeros((6, 1))
+    moved = palm.apply(still[:3].T)
+    assert np.linalg.matrix_rank(moved, tol=1e-6) == (0 if sticks else 2)
+    assert np.abs(moved[:, 2]).max() < 1e-9
+
+
+BOX = """
+name: box
+object: {{mass: 0.2, shapes: [{{box: {{center: [0, 0, 0], size: [0.06, 0.06, 0.06]}}}}]}}
+palm: {{radius: 0.05, position: [0, 0, -0.5], facing: [0, 0, 1]}}
+motion: [{{at: 0, position: [0, 0, 0]}}, {{at: 1, position: [0, 0, 0]}}]
+fingers: {{left: {{touches: [-0.03, 0, {height}]}}, right: {{touches: [0.03, 0, {height}]}}}}
+hand: {{joint_limits: [-180, 180], link_radius: 0.006, link_length: [0.001, 1]}}
+"""
+
+
+@pytest.mark.parametrize("height", [0.0, 0.01])
+def test_fingers_that_lie_along_a_box_hold_it(tmp_path: Path, height: float) -> None:
+    """Neither can tip on its face, and no joint moves: springs have nothing to make up for.
+
+    Where they meet along lines, nearest points are anywhere on these: contacts are where the plan has them.
+    """
+    task = read_task(tmp_path, BOX.format(height=height))
+    long, low = 0.1, -0.06
+    hand = tuple(
+        Finger(name, (side * (0.03 + TIP), 0.0, low), (Link(long, TIP, (0.0, 1.0, 0.0)),))
+        for name, side in (("left", -1.0), ("right", 1.0))
+    )
+    scene = plain(task, TIME)
+    points = np.array([[-0.03, 0.0, height], [0.03, 0.0, height]])
+    there = np.array([[TIP, 0.0, height - low], [-TIP, 0.0, height - low]])
+    folder = read_folder(
+        Scene(task, replace(scene.hand, fingers=hand), scene.motion)
+        .moved(
+            object_position=np.zeros((11, 3)),
+            base_position=np.zeros((11, 3)),
+            base_orientation=np.tile([1.0, 0.0, 0.0, 0.0], (11, 1)),
+            joint_names=("finger0_joint0", "finger1_joint0"),
+            joint_angles=np.zeros((11, 2)),
+            contact_link=("finger0_link0", "finger1_link0"),
+            contact_active=np.ones((11, 2), bool),
+            contact_force=np.tile([squeeze(4.0)], (11, 1, 1)),
+            contact_point_object=np.tile(points, (11, 1, 1)),
+            contact_point_link=np.tile(there, (11, 1, 1)),
+        )
+        .write(tmp_path / "result")
+    )
+    mode = first(folder)
+    assert mode.stiffness == pytest.approx(0.0, abs=1e-6)
+    assert np.array(Stability(folder).first)[:, 0, :, 2] == pytest.approx(height)
