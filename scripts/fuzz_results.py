@@ -38,8 +38,8 @@ from casadi_hands.verify.audit import audit
 from casadi_hands.verify.reading.folder import read_folder
 from casadi_hands.verify.replays.engine import load_mujoco
 from casadi_hands.verify.replays.perturb import Perturbation
+from casadi_hands.verify.replays.plan import Plan
 from casadi_hands.verify.replays.replay import ENGINES, Player
-from casadi_hands.verify.replays.simulation import Plan
 
 SECONDS, GIVEN_UP = 5.0, 40
 """CPU seconds that a reading may take, and wall seconds after which it is ended."""

@@ -20,7 +20,8 @@ from casadi_hands.verify.held import Held, held, joint_problems
 from casadi_hands.verify.reading.folder import Folder, read_folder
 from casadi_hands.verify.reading.scene_file import read_scene
 from casadi_hands.verify.replays.perturb import Perturbation
-from casadi_hands.verify.replays.simulation import Plan, Simulation
+from casadi_hands.verify.replays.plan import Plan
+from casadi_hands.verify.replays.simulation import Simulation
 from tests.verify.fixture import Scene, plain, read_task
 
 TIME = np.linspace(0.0, 1.0, 41)

@@ -22,9 +22,10 @@ from casadi_hands.verify import Perturbation, replay
 from casadi_hands.verify.audit import audit_files
 from casadi_hands.verify.figures.coupling import coupling_figures
 from casadi_hands.verify.reading.folder import read_folder
+from casadi_hands.verify.replays.plan import Plan
 from casadi_hands.verify.replays.replay import ENGINES
 from casadi_hands.verify.replays.series import stronger_motors
-from casadi_hands.verify.replays.simulation import SUPPORT, Plan, Simulation
+from casadi_hands.verify.replays.simulation import SUPPORT, Simulation
 from tests.verify.falsify import both
 from tests.verify.fixture import Scene, carried, result
 

@@ -25,8 +25,8 @@ from casadi_hands.verify.reading.folder import Folder, read_folder
 from casadi_hands.verify.replays.drake import DrakeSimulation, load_drake
 from casadi_hands.verify.replays.drake_scene import PATCH, PRESS
 from casadi_hands.verify.replays.perturb import suite
+from casadi_hands.verify.replays.plan import Plan
 from casadi_hands.verify.replays.replay import can_play
-from casadi_hands.verify.replays.simulation import Plan
 from tests.verify.fixture import MASS, RADIUS, Scene, carried
 
 WEIGHT, FLOOR, GROUND_FRICTION = MASS * 9.81, -1.0, 0.3
@@ -76,13 +76,16 @@ def _plan(folder: Folder, steps: int, **changes: Any) -> Any:
     plan = SimpleNamespace(
         angles=np.tile(motion.joint_angles[0], (steps + 1, 1)),
         commands=np.tile(motion.joint_angles[0], (steps + 1, 1)),
+        damped=np.zeros((steps + 1, len(motion.joint_names))),
         palm_position=np.tile(motion.base_position[0], (steps + 1, 1)),
         palm_quaternion=np.tile(motion.base_orientation[0], (steps + 1, 1)),
         external_force=np.zeros((steps + 1, 3)),
         external_torque=np.zeros((steps + 1, 3)),
     )
     vars(plan).update(changes)
-    return type("Plan", (SimpleNamespace,), {"__len__": lambda self: len(self.angles)})(**vars(plan))
+    return type("Plan", (SimpleNamespace,), {"__len__": lambda self: len(self.angles), "ahead": Plan.ahead})(
+        **vars(plan)
+    )
 
 
 def _still(

@@ -19,8 +19,9 @@ from casadi_hands.verify.reading.folder import Folder, read_folder
 from casadi_hands.verify.replays import replay as replay_module
 from casadi_hands.verify.replays import series
 from casadi_hands.verify.replays.perturb import draw_perturbation, suite
+from casadi_hands.verify.replays.plan import Plan
 from casadi_hands.verify.replays.replay import ATTEMPTS, Replay, replay_each
-from casadi_hands.verify.replays.simulation import Plan, Simulation
+from casadi_hands.verify.replays.simulation import Simulation
 from tests.verify.fixture import SPHERE, carried, plain, read_task
 
 FIELDS = (
@@ -121,6 +122,24 @@ def test_motors_have_another_stiffness_and_press_as_planned(folder: Folder) -> N
         ahead = commands(folder, stiffness=factor)[0] - folder.motion.joint_angles[0]
         torques.append(scene.model.actuator_gainprm[:, 0] * ahead)
     assert torques[1] == pytest.approx(torques[0])
+
+
+@pytest.mark.parametrize("factor", [0.04, 0.5, 1.0, 4.0])
+def test_motors_of_another_stiffness_press_as_planned_while_joints_move(tmp_path: Path, factor: float) -> None:
+    """Their dampers are as much of critical as before, so they hold back by so much less than springs give."""
+    scene = carried(tmp_path / "task")
+    waves = 0.2 * np.sin(np.pi * scene.motion.time / scene.motion.time[-1]) ** 2
+    moving = scene.moved(joint_angles=scene.motion.joint_angles + waves[:, None])
+    folder = read_folder(moving.write(tmp_path / "result"))
+    motion, model = folder.motion, Simulation(folder, Perturbation(stiffness=factor)).model
+    assert motion.joint_torques is not None
+    assert motion.joint_velocities is not None
+    stiffness, damping = model.actuator_gainprm[:, 0], -model.actuator_biasprm[:, 2]
+    steps = np.round(motion.time / 1e-3).astype(int)
+    held_back = damping * motion.joint_velocities
+    assert np.abs(held_back).max() > 0.005 * np.abs(motion.joint_torques).max()
+    pressing = stiffness * Plan(folder, 1e-3).ahead(steps, Perturbation(stiffness=factor)) - held_back
+    assert pressing == pytest.approx(motion.joint_torques, abs=1e-6 * np.abs(motion.joint_torques).max())
 
 
 def commands(folder: Folder, **changes: float) -> np.ndarray:

@@ -12,14 +12,7 @@ from casadi_hands.errors import DesignError
 from casadi_hands.verify.reading.drive import Drive
 from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.replays.perturb import Perturbation
-
-
-class Plan(Protocol):
-    """What the hand is told at every step: (T, J) angles and commands, (T, N) positions of motors or None, all rad."""
-
-    angles: np.ndarray
-    commands: np.ndarray
-    motors: np.ndarray | None
+from casadi_hands.verify.replays.plan import Plan
 
 
 class Actuation(Protocol):
@@ -66,8 +59,7 @@ class OwnMotors:
 
     def set_points(self, plan: Plan, told: np.ndarray, perturbation: Perturbation) -> tuple[np.ndarray, np.ndarray]:
         """Commands as told: joints press as planned, whatever their stiffness, and are off as their sensors are."""
-        harder = perturbation.squeeze / perturbation.stiffness
-        ahead = harder * (plan.commands[told] - plan.angles[told])
+        ahead = plan.ahead(told, perturbation)
         return plan.angles[told] + bias(perturbation, plan.angles.shape[1]) + ahead, ahead
 
 

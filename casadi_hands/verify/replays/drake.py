@@ -52,7 +52,8 @@ from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.replays.drake_scene import Motor, Shapes, load_drake, read_mechanics, read_motors, transform
 from casadi_hands.verify.replays.engine import one_line
 from casadi_hands.verify.replays.perturb import Perturbation
-from casadi_hands.verify.replays.simulation import RELEASE, SQUEEZE, SUPPORT, Observer, Plan
+from casadi_hands.verify.replays.plan import Plan
+from casadi_hands.verify.replays.simulation import RELEASE, SQUEEZE, SUPPORT, Observer
 
 STEP = 2e-3
 """s; half of it changes the object's path by about 0.1 mm at most."""
@@ -85,7 +86,7 @@ class DrakeSimulation:
         self._drake = drake = load_drake()
         self._names, self._drive = folder.motion.joint_names, folder.drive
         motors, self._moves = read_motors(folder, perturbation)
-        self._harder = perturbation.squeeze / perturbation.stiffness
+        self._perturbation = perturbation
         self._late = round(perturbation.delay / STEP)
         self._bias = np.asarray(perturbation.joint_bias or np.zeros(len(self._names)))
         builder = drake.systems.framework.DiagramBuilder()
@@ -242,8 +243,7 @@ class DrakeSimulation:
         told = max(i - self._late, 0)
         targets, rates = plan.commands[told] + self._bias, np.zeros(len(self._names))
         if self._drive is None:
-            ahead = squeeze * self._harder * (plan.commands[told] - plan.angles[told])
-            targets = plan.angles[told] + self._bias + ahead
+            targets = plan.angles[told] + self._bias + squeeze * plan.ahead(told, self._perturbation)
         elif plan.motors is not None and i > self._late:
             # A spring's damper is between the joint and what its motors turn.
             rates = self._drive.ratios @ (plan.motors[told] - plan.motors[told - 1]) / self.step

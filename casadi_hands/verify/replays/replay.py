@@ -36,7 +36,8 @@ from casadi_hands.verify.held import held
 from casadi_hands.verify.reading.folder import Folder, read_folder
 from casadi_hands.verify.replays.mounted import turned_far
 from casadi_hands.verify.replays.perturb import Perturbation, draw_perturbation
-from casadi_hands.verify.replays.simulation import Observer, Plan, Simulation
+from casadi_hands.verify.replays.plan import Plan
+from casadi_hands.verify.replays.simulation import Observer, Simulation
 
 DROP = 0.5
 """Share of half the object's extent by which it may be off its plan before it counts as dropped."""
