@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import threading
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +13,7 @@ PHONE = 576
 NARROW = 1200
 """px; in windows narrower than this the file's panel is folded up, to leave room for the scene."""
 _SHEET = 0.5
+_TRIES = 100  # to place one page's camera
 
 
 @dataclass(frozen=True)
@@ -52,15 +52,16 @@ def arrange(client: Any, panel: Any, view: View | None) -> None:
     """Arrange a page that was just opened for the size of its window.
 
     Args:
-        client: viser's, of the page; no panel has its place yet, so that its scene is as wide as the window.
+        client: viser's, of the page; no panel has its place yet, so that its scene is as wide as the window. A page
+            that comes back after it lost its connection still has its panels, and is arranged by what these leave.
         panel: viser's, of the task's file, which is folded up where there is little room.
         view: what the camera shall see; None leaves it.
     """
     width = client.camera.image_width
     if view is not None:
         follow = _Follow(client, view, width <= PHONE)
-        client.camera.on_update(follow)
-        follow(client.camera)
+        follow.place(client.camera)
+        client.camera.on_update(follow.heed)
     main, file = client.gui.main_panel, client.gui.main_panel
     file._placement_uuid = panel._placement_uuid  # viser lets a page place none but its main panel
     main.dock_right()
@@ -76,22 +77,25 @@ class _Follow:
 
     def __init__(self, client: Any, view: View, sheet: bool) -> None:
         self._client, self._view, self._sheet = client, view, sheet
-        self._lock = threading.Lock()
-        self._size = (0, 0)
         self._known = [np.array(client.camera.position)]
         """Where the camera has been by itself, (3,) each."""
-        self._moved = False
+        self._left, self._moved = _TRIES, False
 
-    def __call__(self, camera: Any) -> None:
-        with self._lock:
-            size, position = (camera.image_width, camera.image_height), camera.position
-            near = 1e-3 * self._view.reach
-            self._moved |= all(np.linalg.norm(position - each) > near for each in self._known)
-            if self._moved or size == self._size or min(size) <= 0:
-                return
-            self._size = size
-            position, middle = placed(self._view, camera.fov, size, self._sheet)
-            self._known.append(position)
-            with self._client.atomic():
-                camera.position = position  # takes along where it looks
-                camera.look_at = middle
+    async def heed(self, camera: Any) -> None:
+        """Place the camera by what the page has just said; viser hears no more of it before this returns."""
+        self.place(camera)
+
+    def place(self, camera: Any) -> None:
+        """Place the camera, unless it is there, or was moved."""
+        size, near = (camera.image_width, camera.image_height), 1e-3 * self._view.reach
+        self._moved |= all(np.linalg.norm(camera.position - each) > near for each in self._known)
+        if self._moved or min(size) <= 0 or not self._left:
+            return
+        position, middle = placed(self._view, camera.fov, size, self._sheet)
+        if max(np.linalg.norm(camera.position - position), np.linalg.norm(camera.look_at - middle)) <= near:
+            return
+        self._known.append(position)
+        self._left -= 1
+        with self._client.atomic():
+            camera.position = position  # takes along where it looks
+            camera.look_at = middle

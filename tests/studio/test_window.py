@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 import time
 from base64 import b64decode
 from contextlib import nullcontext
-from types import SimpleNamespace
-from unittest.mock import Mock
+from unittest.mock import Mock, call
 
 import numpy as np
 import pytest
@@ -92,41 +92,58 @@ def test_it_follows_the_browser_when_that_changes(browser, address):
     browser.wait(f"{scheme} === 'light'")
 
 
-class Camera:
-    """A page's, that is told of what the page has."""
+class Page:
+    """A client of viser's with its camera, which is told of what the page has."""
 
     def __init__(self) -> None:
         self.position, self.look_at, self.fov = np.full(3, 3.0), np.zeros(3), np.radians(75)
-        self.image_width, self.image_height = 0, 0
-        self.heeds = []
-        self.gui = SimpleNamespace(main_panel=Mock())
-        self.camera, self.atomic = self, nullcontext
+        self.image_width, self.image_height = 768, 0
+        self.heeds, self.panels = [], []
+        self.camera, self.atomic, self.gui = self, nullcontext, self
+        self.on_update = self.heeds.append
 
-    def on_update(self, heed):
-        self.heeds.append(heed)
+    @property
+    def main_panel(self):
+        """A new handle each time, as viser gives it."""
+        self.panels.append(Mock(_placement_uuid="main"))
+        return self.panels[-1]
 
-    def has(self, width, height, position=None):
+    def says(self, width, height, position=None, look_at=None):
         self.image_width, self.image_height = width, height
         self.position = self.position if position is None else position
+        self.look_at = self.look_at if look_at is None else look_at
         for heed in self.heeds:
-            heed(self)
+            asyncio.run(heed(self))
         return self.position
 
 
 def test_the_camera_follows_the_scene_until_someone_moves_it():
-    view = View(np.zeros(3), np.array([1.0, 0, 0]), 0.2)
-    camera = Camera()
-    camera.image_width = 768
-    arrange(camera, Mock(_placement_uuid="file"), view)  # before there is a scene
-    wide, late, narrow = camera.has(768, 1024), np.full(3, 3.0), camera.has(364, 1024)
+    view = View(np.array([0.1, 0, 0]), np.array([1.0, 0, 0]), 0.2)
+    page = Page()
+    arrange(page, Mock(_placement_uuid="file"), view)  # before there is a scene
+    first, wide, narrow = page.position, page.says(768, 1024), page.says(364, 1024)
     assert np.linalg.norm(narrow) > np.linalg.norm(wide)
-    assert camera.has(364, 1024, late) is late  # what the page said before it heard
-    assert camera.has(768, 1024, narrow) == pytest.approx(wide)
+    assert page.says(364, 1024, first) == pytest.approx(narrow)  # what the page said before it heard
+    assert page.says(768, 1024, narrow) == pytest.approx(wide)
+    assert page.says(364, 1024, wide) == pytest.approx(narrow)
+    page.says(364, 1024, narrow, narrow - wide)
+    assert page.look_at == pytest.approx(view.middle)
     own = np.add(wide, [0, 0.01, 0])
-    assert camera.has(768, 1024, own) is own
-    assert camera.has(364, 1024, own) is own
-    assert camera.has(364, 1024, wide) is wide
-    camera.gui.main_panel.minimize.assert_called_once()
+    assert page.says(768, 1024, own) is own
+    assert page.says(364, 1024, own) is own
+    assert page.says(364, 1024, wide) is wide
+
+
+@pytest.mark.parametrize(("width", "folded"), [(390, False), (768, True), (1440, False)])
+def test_panels_are_docked_and_the_file_s_is_folded_up_where_there_is_little_room(width, folded):
+    page = Page()
+    page.image_width = width
+    arrange(page, Mock(_placement_uuid="file"), None)
+    (right,) = (each for each in page.panels if each._placement_uuid == "main")
+    (left,) = (each for each in page.panels if each._placement_uuid == "file")
+    assert right.method_calls == [call.dock_right(), call.set_width(360)]
+    assert left.method_calls == [call.dock_left(), call.set_width(430), *[call.minimize()] * folded]
+    assert page.heeds == []
 
 
 @pytest.mark.parametrize("sheet", [False, True])
