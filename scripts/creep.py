@@ -17,7 +17,6 @@ from tempfile import TemporaryDirectory
 from shared import NOTHING, write_table
 from tables import add_json, write_record
 
-from casadi_hands.errors import HandsError
 from casadi_hands.export.design import Design
 from casadi_hands.verify import Replay, replay
 
@@ -36,11 +35,9 @@ def main() -> None:
     rows = []
     for path in given.folders:
         played = [with_friction(path, ratio, passes) for ratio, passes in SETTINGS]
-        try:
-            other = shown(replay(path, engine="drake"))
-        except HandsError:
-            other = NOTHING  # Drake replays free objects alone
-        rows.append([Design.load(path).task.name, *map(shown, played), other])
+        task = Design.load(path).task
+        free = task.object.attached is None  # Drake replays no others
+        rows.append([task.name, *map(shown, played), shown(replay(path, engine="drake")) if free else NOTHING])
         write_table(HEAD, rows, given.out)
     if given.json:
         write_record(given.json, "creep", HEAD, rows)
