@@ -56,7 +56,7 @@ def test_lowest_points_are_the_lowest_of_the_surface(shape: Any) -> None:
     rng = np.random.default_rng(4)
     up = rng.normal(size=(20, 3))
     up /= np.linalg.norm(up, axis=1, keepdims=True)
-    found = lowest_points(shape, up, np.zeros((20, 3)))
+    found = lowest_points(shape, up, np.zeros((20, 3)), np.zeros(20, bool))
     axis = shape.end - shape.start
     across = null_space(axis[None])
     turns = np.linspace(0, 2 * np.pi, 721)
@@ -79,7 +79,13 @@ def test_what_lies_flat_cannot_tip() -> None:
     for shape in (bar, drum):
         assert np.abs(level_directions(shape, up)) == pytest.approx(np.array([[0.0, 1.0, 0.0]]))
         # On a line it touches where the plan has it.
-        assert lowest_points(shape, up[None], planned) == pytest.approx(np.array([[0.01, 0.0, -0.01]]))
+        assert lowest_points(shape, up[None], planned, np.array([False])) == pytest.approx(
+            np.array([[0.01, 0.0, -0.01]])
+        )
+        # Tilted a little from a plan in which it lies, it is where the plan has it still.
+        lifted = np.array([[np.sin(0.01), 0.0, np.cos(0.01)]])
+        assert lowest_points(shape, lifted, planned, np.array([True]))[0, 0] == pytest.approx(0.01, abs=2e-4)
+        assert lowest_points(shape, lifted, planned, np.array([False]))[0, 0] < -0.03
     assert len(level_directions(bar, along)) == 0
     flat = level_directions(drum, along)
     assert flat @ flat.T == pytest.approx(np.eye(2))

@@ -13,9 +13,11 @@ from scipy.linalg import eigh, null_space
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.problem.hand import Finger, Link
+from casadi_hands.verify.figures.grasp import straight
 from casadi_hands.verify.figures.stability import Mode, Stability
 from casadi_hands.verify.figures.stiffness import stability_figures
 from casadi_hands.verify.reading.folder import Folder, read_folder
+from casadi_hands.verify.shapes import Capsule
 from tests.verify.fixture import TIP, Scene, carried, plain, read_task
 
 TIME = np.linspace(0.0, 1.0, 11)
@@ -322,6 +324,23 @@ def test_a_bar_that_lies_on_the_ground_rolls_and_does_not_tip(tmp_path: Path, ti
     moved = palm.apply(still[:3].T)
     assert np.linalg.matrix_rank(moved, tol=1e-6) == (0 if sticks else 2)
     assert np.abs(moved[:, 2]).max() < 1e-9
+
+
+@pytest.mark.parametrize(("degrees", "lies"), [(0.0, True), (2.0, True), (10.0, False), (20.0, False)])
+@pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
+def test_links_lie_along_bars_that_they_hardly_cross(degrees: float, lies: bool, share: float) -> None:
+    bar, radius = Capsule(np.array([-0.1, 0.0, 0.0]), np.array([0.1, 0.0, 0.0]), 0.01), 0.005
+    way = np.array([np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees)), 0.0])
+    start = np.array([0.0, 0.0, 0.015]) - share * 0.03 * way
+    sides = straight(bar, start, start + 0.03 * way, share, 0.1 * radius, radius)
+    assert sides == (lies and share > 0.0, lies and share < 1.0)
+
+
+@pytest.mark.parametrize("off", [0.0, 2e-4, 3e-4, 4e-4, 1e-3])
+def test_links_do_not_lie_along_a_ball(off: float) -> None:
+    ball, radius = Capsule(np.zeros(3), np.zeros(3), 0.03), 0.006
+    start, end = (np.array([x - off, 0.0, 0.036]) for x in (-0.02, 0.03))
+    assert straight(ball, start, end, 0.4, 0.1 * radius, radius) == (False, False)
 
 
 BOX = """

@@ -51,34 +51,37 @@ def closest_to_capsule(
     return axis - 0.5 * gap[:, None] * normal, normal
 
 
-def lowest_points(shape: Shape, up: np.ndarray, planned: np.ndarray) -> np.ndarray:
+def lowest_points(shape: Shape, up: np.ndarray, planned: np.ndarray, level: np.ndarray) -> np.ndarray:
     """Return the points (N, 3) of a shape that are lowest, m, its frame.
 
-    Where a whole line or face is lowest, it is where the plan has it.
+    Where a whole line or face is lowest, or is so in the plan, it is where the plan has it.
 
     Args:
         shape: in its own frame.
         up: (N, 3) unit, upward directions, its frame.
         planned: (N, 3) m.
+        level: (N,) whether it stands on a line or a face in the plan.
 
     Raises:
         NotImplementedError: the shape is another.
     """
     if isinstance(shape, Flat):
-        return np.array([_lowest_of(shape, *each) for each in zip(up, planned, strict=True)])
+        found = [_lowest_of(shape, *each) for each in zip(up, planned, strict=True)]
+        return np.where(level[:, None], planned, found)
     start, axis = _axis(shape)
     length = float(np.linalg.norm(axis))
     unit = axis / max(length, 1e-300)
     tilt = up @ unit
     share = np.clip((planned - start) @ unit / max(length, 1e-300), 0.0, 1.0)
-    share = np.where(np.abs(tilt) < LEVEL, share, (tilt < 0.0).astype(float))
+    upright = level & (np.abs(tilt) > 0.5)
+    share = np.where(level & ~upright | (np.abs(tilt) < LEVEL), share, (tilt < 0.0).astype(float))
     points: np.ndarray = start + share[:, None] * axis
     if isinstance(shape, Capsule):
         return points - shape.radius * up
     across = up - tilt[:, None] * unit
     size = np.linalg.norm(across, axis=1, keepdims=True)
     rim = points - shape.radius * across / np.maximum(size, 1e-300)
-    return np.where(size < LEVEL, planned, rim)
+    return np.where(upright[:, None] | (size < LEVEL), planned, rim)
 
 
 def _lowest_of(shape: Flat, up: np.ndarray, planned: np.ndarray) -> np.ndarray:

@@ -18,11 +18,14 @@ from casadi_hands.verify.figures.mount import Mount
 from casadi_hands.verify.figures.torsion import most_torsion, tip_radius
 from casadi_hands.verify.held import held
 from casadi_hands.verify.reading.folder import Folder
+from casadi_hands.verify.shapes import Shape
 
 TWIST = np.deg2rad(5.0)
 """Angle of a contact's spin at which torsional friction has given all it has: it counts as a spring until then."""
-ALONG, NEARBY = 2.5e-3, 0.1
-"""rad: a link that is turned less from a surface, over this share of its radius, lies along it."""
+ALONG = 2.5e-3
+"""rad: a link lies along a surface if both are turned less from each other, over the link's radius, too."""
+NEARBY, WIDE = 0.1, 0.5
+"""Of the link's radius: on one side of a contact, so that the link lies there; on both, so that it cannot tip."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +52,8 @@ class Lying:
     """Contacts of links that lie along the object.
 
     Attributes:
-        at_all: (S, C): on one side of the contact or on both; the contact is where the plan has it.
-        flat: (S, C): on both, so that the link does not tip.
+        at_all: (S, C): near the contact, on one side at least; the contact is where the plan has it.
+        flat: (S, C): far enough on both sides for the link not to tip.
     """
 
     at_all: np.ndarray
@@ -111,7 +114,8 @@ class Grasp:
                 up = self.up[placed.sample[rows]]
                 seen = np.einsum("nji,nj->ni", turn, up)
                 planned = folder.motion.contact_point_object[placed.sample[rows], contact]
-                at, out = lowest_points(shape, seen, planned), -seen
+                level = self.level[placed.sample[rows], contact]
+                at, out = lowest_points(shape, seen, planned, level), -seen
             else:
                 start, end = (each[rows] for each in self._axis(placed, contact))
                 lies, share = (each[placed.sample[rows], contact][:, None] for each in (self.lying.at_all, self.share))
@@ -133,6 +137,17 @@ class Grasp:
         return start, end
 
     @cached_property
+    def level(self) -> np.ndarray:
+        """Where (S, C) the object stands on a line or a face in the plan."""
+        motion = self.folder.motion
+        found = np.zeros(motion.contact_active.shape, bool)
+        for c in np.flatnonzero(np.array(motion.contact_link) == "ground"):
+            for k in np.flatnonzero(motion.contact_active[:, c]):
+                shape = self.folder.object.nearest(motion.contact_point_object[k, c])
+                found[k, c] = len(level_directions(shape, self.turn[k].T @ self.up[k])) > 0
+        return found
+
+    @cached_property
     def share(self) -> np.ndarray:
         """How far along its link's axis (S, C) each contact is in the plan, 0 to 1."""
         motion = self.folder.motion
@@ -148,20 +163,20 @@ class Grasp:
     def lying(self) -> Lying:
         """Which contacts are of links that lie along the object, as on its faces."""
         folder, motion = self.folder, self.folder.motion
-        sides = np.zeros((*motion.contact_active.shape, 2), bool)
+        at_all, flat = np.zeros((2, *motion.contact_active.shape), bool)
         for c, link in enumerate(motion.contact_link):
             if link == "ground":
                 continue
             start, end = self._axis(self.planned, c)
             capsule = folder.links[link].capsules[0]
-            length, step = max(float(np.linalg.norm(capsule.end - capsule.start)), 1e-300), NEARBY * capsule.radius
             for k in np.flatnonzero(motion.contact_active[:, c]):
                 shape = folder.object.nearest(motion.contact_point_object[k, c])
-                near = np.clip(self.share[k, c] + np.array([-1.0, 0.0, 1.0]) * step / length, 0.0, 1.0)
-                far = shape.distance(start[k] + near[:, None] * (end[k] - start[k]))
-                run, rise = length * np.diff(near), np.abs(np.diff(far))
-                sides[k, c] = np.logical_and(run > 0.5 * step, rise < ALONG * run)
-        return Lying(np.any(sides, axis=2), np.all(sides, axis=2))
+                near, wide = (
+                    straight(shape, start[k], end[k], self.share[k, c], step * capsule.radius, capsule.radius)
+                    for step in (NEARBY, WIDE)
+                )
+                at_all[k, c], flat[k, c] = any(near), all(wide)
+        return Lying(at_all, flat)
 
     def exerted(self, placed: Placements) -> np.ndarray:
         """Return A(x)ᵀ f (N, 6 + J): wrench on the object and torques on the joints, of forces as in the plan."""
@@ -243,3 +258,31 @@ class Grasp:
         normal = self.first[c][1][k]
         most = tip_radius(self.folder, c) * most_torsion(self.forces[k, c], normal, self.folder.friction(c))
         return max(most - abs(float(self.moments[k, c] @ normal)), 0.0)
+
+
+def straight(
+    shape: Shape, start: np.ndarray, end: np.ndarray, share: float, step: float, radius: float
+) -> tuple[bool, bool]:
+    """Return on which sides of a point of an axis, before and after it, a shape's surface goes along it for a step.
+
+    Args:
+        shape: in its own frame.
+        start: (3,) of the axis, m, that frame.
+        end: (3,), likewise.
+        share: of the way, where the point is.
+        step: m; a side counts where at least half of it is on the axis.
+        radius: of the link, m.
+    """
+    length = float(np.linalg.norm(end - start))
+    if length == 0.0:
+        return False, False
+    found = []
+    for sign in (-1.0, 1.0):
+        there = min(max(share + sign * step / length, 0.0), 1.0)
+        run = abs(there - share) * length
+        places = np.array([share, 0.5 * (share + there), there])
+        here, half, beyond = shape.distance(start + places[:, None] * (end - start))
+        # A tilt of the link by so much carries the nearest point farther than its radius.
+        bends = abs(here - 2.0 * half + beyond) > ALONG / radius * run**2 / 4.0
+        found.append(bool(run >= 0.5 * step and abs(beyond - here) < ALONG * run and not bends))
+    return found[0], found[1]

@@ -59,7 +59,7 @@ class Stability(Grasp):
         found = []
         for stuck, loose in zip(modes, self._modes(sticks=False), strict=True):
             worse = max(stuck, loose, key=lambda mode: mode.stiffness)
-            found.append(replace(worse, tips=max(stuck.tips, loose.tips), free=stuck.free))
+            found.append(replace(worse, free=stuck.free))
         return found
 
     def _modes(self, sticks: bool) -> list[Mode]:
