@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from casadi_hands.task import Ground, Task
 
 _TIME_STEP = 0.001  # s
-_IMPRATIO, _NO_SLIP = "100", "20"  # harder friction changes nothing any more (``scripts/creep.py``)
+_IMPRATIO, _NO_SLIP = "100", "20"  # harder friction changes little any more (``scripts/creep.py``)
 _USUAL_FORCE = 2.0  # weights with which contacts press: where more, they are stiffer
 _SOFTNESS = 0.02  # depth over which a contact stiffens, of the characteristic length
 _STILL = 1e-9  # a palm that moves less, relative to its size (or in its quaternion), stands still

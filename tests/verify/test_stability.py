@@ -343,6 +343,50 @@ def test_links_do_not_lie_along_a_ball(off: float) -> None:
     assert straight(ball, start, end, 0.4, 0.1 * radius, radius) == (False, False)
 
 
+def test_ground_that_may_give_way_holds_nothing_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A ball on the ground between two fingers that turn level with it buckles as it does without the ground."""
+    force, length = 1.0, 0.05
+    made = planar(tmp_path / "without", inward(length), squeeze(force))
+    motion, turn = made.motion, Rotation.from_euler("x", 90, degrees=True)  # what is level was across
+    text = BALL.format(radius=RADIUS, center=[0, 0, 0], torsion=0.0) + f"ground: {{height: {-RADIUS}}}\n"
+    task = read_task(tmp_path / "task", text.replace("-0.5], facing: [0, 0, 1]", "0.5], facing: [0, 0, -1]"))
+    upright = np.tile(turn.as_quat(scalar_first=True), (11, 1))
+
+    def beside(values: np.ndarray, last: Sequence[float]) -> np.ndarray:
+        return np.concatenate([values, np.tile(np.array(last, values.dtype), (11, 1, 1))], axis=1)
+
+    scene = plain(task, TIME)
+    fingers = tuple(
+        Finger(name, (base[0], 0.0, base[1]), (Link(each[0], TIP, (0.0, 1.0, 0.0)),))
+        for name, (base, each, _) in zip(task.fingers, inward(length), strict=True)
+    )
+    scene = Scene(task, replace(scene.hand, fingers=fingers), scene.motion).moved(
+        object_position=np.zeros((11, 3)),
+        object_orientation=upright,
+        base_position=np.zeros((11, 3)),
+        base_orientation=upright,
+        joint_names=motion.joint_names,
+        joint_angles=motion.joint_angles,
+        contact_names=(*motion.contact_names, "ground"),
+        contact_link=(*motion.contact_link, "ground"),
+        contact_active=np.ones((11, 3), bool),
+        contact_force=beside(turn.apply(motion.contact_force.reshape(-1, 3)).reshape(11, 2, 3), [0, 0, 1e-9]),
+        contact_point_object=beside(motion.contact_point_object, [0, -RADIUS, 0]),
+        contact_point_link=beside(motion.contact_point_link, [0, 0, -RADIUS]),
+    )
+    grounded = Stability(read_folder(scene.write(tmp_path / "with")))
+    together = force * length * (1 + length / (RADIUS + TIP))
+    assert [mode.stiffness for mode in grounded.modes()] == pytest.approx([together] * 11, rel=1e-4)
+
+    # Where the object would rather be held, or rather not, the one that asks for more counts, and says what it does.
+    one, other = Mode(0.1, 5.0, np.zeros(6), 0.3), Mode(0.2, 3.0, np.ones(6), 0.7)
+    for stuck, loose in ((one, other), (other, one)):
+        monkeypatch.setattr(grounded, "_modes", lambda sticks, both=(loose, stuck): [both[sticks]])
+        (found,) = grounded.modes()
+        assert (found.stiffness, found.tips, found.free) == (0.2, 3.0, stuck.free)
+        assert found.twist is other.twist
+
+
 BOX = """
 name: box
 object: {{mass: 0.2, shapes: [{{box: {{center: [0, 0, 0], size: [0.06, 0.06, 0.06]}}}}]}}
@@ -384,6 +428,10 @@ def test_fingers_that_lie_along_a_box_hold_it(tmp_path: Path, height: float) -> 
         )
         .write(tmp_path / "result")
     )
-    mode = first(folder)
-    assert mode.stiffness == pytest.approx(0.0, abs=1e-6)
+    stability = Stability(folder)
+    assert stability.lying.flat.all()
+    free = null_space(stability.rows(0)[0], rcond=1e-9)
+    assert free.shape[1] > 0
+    assert np.abs(free[6:]).max() < 1e-9
+    assert first(folder).stiffness == pytest.approx(0.0, abs=1e-6)
     assert np.array(Stability(folder).first)[:, 0, :, 2] == pytest.approx(height)

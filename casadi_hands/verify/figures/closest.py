@@ -73,7 +73,7 @@ def lowest_points(shape: Shape, up: np.ndarray, planned: np.ndarray, level: np.n
     unit = axis / max(length, 1e-300)
     tilt = up @ unit
     share = np.clip((planned - start) @ unit / max(length, 1e-300), 0.0, 1.0)
-    upright = level & (np.abs(tilt) > 0.5)
+    upright = level & (np.abs(tilt) > 0.5)  # stands on its face, the axis up; else it lies, the axis level
     share = np.where(level & ~upright | (np.abs(tilt) < LEVEL), share, (tilt < 0.0).astype(float))
     points: np.ndarray = start + share[:, None] * axis
     if isinstance(shape, Capsule):
