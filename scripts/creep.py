@@ -10,11 +10,10 @@ from __future__ import annotations
 
 import re
 import shutil
-from argparse import ArgumentParser
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from shared import NOTHING, write_table
+from shared import NOTHING, options_of, write_table
 from tables import add_json, write_record
 
 from casadi_hands.export.design import Design
@@ -27,7 +26,7 @@ _OPTION = re.compile(r'(<option[^>]*) impratio="[^"]*" noslip_iterations="[^"]*"
 
 def main() -> None:
     """Compare them in every folder."""
-    parser = ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser = options_of(__doc__)
     parser.add_argument("folders", metavar="DIR", nargs="+", type=Path, help="result folders")
     parser.add_argument("--out", type=Path, default=Path("results/creep.md"), help="file for the table")
     add_json(parser)

@@ -9,11 +9,10 @@ than with the task's own motors. All else stays as planned: softer motors get co
 
 from __future__ import annotations
 
-from argparse import ArgumentParser
 from pathlib import Path
 
 import numpy as np
-from shared import write_table
+from shared import options_of, write_table
 from tables import add_json, write_record
 
 from casadi_hands.verify import Perturbation
@@ -32,7 +31,7 @@ ROUNDS = 5
 
 def main() -> None:
     """Compare them in every folder."""
-    parser = ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser = options_of(__doc__)
     parser.add_argument("folders", metavar="DIR", nargs="+", type=Path, help="result folders")
     parser.add_argument("--out", type=Path, default=Path("results/stiffness.md"), help="file for the table")
     add_json(parser)

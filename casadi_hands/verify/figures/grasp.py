@@ -137,14 +137,21 @@ class Grasp:
         return start, end
 
     @cached_property
-    def level(self) -> np.ndarray:
-        """Where (S, C) the object stands on a line or a face in the plan."""
-        motion = self.folder.motion
-        found = np.zeros(motion.contact_active.shape, bool)
+    def tips(self) -> dict[tuple[int, int], np.ndarray]:
+        """Directions (n, 3), palm frame, about which the object cannot tip on the ground, by sample and contact."""
+        motion, found = self.folder.motion, {}
         for c in np.flatnonzero(np.array(motion.contact_link) == "ground"):
             for k in np.flatnonzero(motion.contact_active[:, c]):
                 shape = self.folder.object.nearest(motion.contact_point_object[k, c])
-                found[k, c] = len(level_directions(shape, self.turn[k].T @ self.up[k])) > 0
+                found[int(k), int(c)] = level_directions(shape, self.turn[k].T @ self.up[k]) @ self.turn[k].T
+        return found
+
+    @cached_property
+    def level(self) -> np.ndarray:
+        """Where (S, C) the object stands on a line or a face in the plan."""
+        found = np.zeros(self.folder.motion.contact_active.shape, bool)
+        for place, directions in self.tips.items():
+            found[place] = len(directions) > 0
         return found
 
     @cached_property
@@ -242,8 +249,7 @@ class Grasp:
                 across *= self.folder.length / max(float(np.linalg.norm(across)), 1e-300)
                 grasp.append(np.concatenate([np.zeros(3), across, -(across @ jacobian[3:]) * self.moves[c]])[None])
             if motion.contact_link[c] == "ground" and sticks:
-                shape = self.folder.object.nearest(motion.contact_point_object[k, c])
-                tips = level_directions(shape, self.turn[k].T @ self.up[k]) @ self.turn[k].T * self.folder.length
+                tips = self.tips[k, int(c)] * self.folder.length
                 grasp.append(np.hstack([np.zeros_like(tips), tips, np.zeros((len(tips), jacobian.shape[1]))]))
         return np.vstack(grasp), np.array(spins), np.array(stiff)
 
