@@ -86,7 +86,14 @@ GROUND_LOAD = Term(
     "The ground's normal force, whose friction along a line or a face resists turns that are not planned to be",
     "",
     "m·g",
-    weights={"refine": Weight(2.0, "knot")},
+    weights={"refine": Weight(20.0, "knot")},
+)
+GROUND_WANDER = Term(
+    "ground_wander",
+    "Changes of how fast the contact on the ground moves along the object, which little load leaves free",
+    "",
+    "length/s",
+    weights={"refine": Weight(10.0, "knot")},
 )
 FRICTION_MARGIN = Term(
     "friction_margin",

@@ -176,6 +176,17 @@ def ground_rolling(kind: type[Body]) -> Kernel:
 
 
 @cache
+def ground_wander() -> Kernel:
+    """How evenly the contact with the ground moves along the object over three knots."""
+    kernel = Kernel("ground_wander")
+    points = [kernel.variable(f"point{i}", 3, "point", i) for i in range(3)]
+    steps = [kernel.parameter(f"step{i}", 1, "step", i) for i in range(2)]
+    rates = [(after - before) / step for before, after, step in zip(points[:-1], points[1:], steps, strict=True)]
+    kernel.cost(contact.GROUND_WANDER, rates[1] - rates[0])
+    return kernel
+
+
+@cache
 def object_apart(kinds: tuple[type[Body], ...], grounded: bool) -> Kernel:
     """The object clear of the palm, and above the ground if there is one, at one knot."""
     kernel = Kernel("object_apart")

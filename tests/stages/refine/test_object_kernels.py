@@ -280,6 +280,15 @@ def test_a_ground_contact_s_numbers_are_those_of_scipy_s_rotations(seed: int) ->
         np.testing.assert_allclose(value, found[name], rtol=1e-12)
 
 
+def test_a_contact_that_moves_evenly_along_the_object_does_not_wander() -> None:
+    steps, speed = {"step0": 0.1, "step1": 0.05}, np.array([0.02, -0.01, 0.03])
+    even = {"point0": np.zeros(3), "point1": 0.1 * speed, "point2": 0.15 * speed}
+    np.testing.assert_allclose(numbers(body.ground_wander(), even, steps)["ground_wander"], 0, atol=1e-20)
+    off = np.array([1e-3, 0, -2e-3])
+    found = numbers(body.ground_wander(), {**even, "point1": even["point1"] + off}, steps)["ground_wander"]
+    assert found[0] == pytest.approx(np.sum((off / 0.1 + off / 0.05) ** 2), rel=1e-12)
+
+
 @pytest.mark.parametrize("angle", [-0.5, -0.1, 0.05, 0.2, 0.5])
 @pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
 def test_a_capsule_that_rolls_on_the_ground_slips_only_to_fifth_order(angle: float, share: float) -> None:

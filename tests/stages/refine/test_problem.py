@@ -277,7 +277,7 @@ def test_every_weight_moves_its_own_term(case: MadeUp) -> None:
     }  # the proximal term weighs in restorations only
     # Second forces are there for disturbances alone, the ground's load and shared motors where there are any.
     on_ground = case.stage.problem.variables["force"].shape[1] == 9
-    absent = {"motor_acceleration"} | (set() if on_ground else {"ground_load"})
+    absent = {"motor_acceleration"} | (set() if on_ground else {"ground_load", "ground_wander"})
     assert set(WEIGHTS) - set(weights) == absent | ({"force_regularisation"} if case.model.tool is not None else set())
     evaluate = case.stage.solver.evaluate
     plain = evaluate(case.values, case.parameters(weights))  # type: ignore[arg-type]
