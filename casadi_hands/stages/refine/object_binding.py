@@ -129,10 +129,9 @@ def bind_ground(of: Declaration) -> None:
         **of.at(start, "reference", "step"),
         **of.of(c, start, "body"),
     )
-    thrice = np.intersect1d(start, start - 1)
-    if len(thrice):
-        points = [point.take(thrice + k) for k in range(3)]
-        problem.bind(kernels.ground_wander(), point=points, step=of.steps(thrice, thrice + 1))
+    first = np.intersect1d(start, start - 1)  # of three knots at which it touches
+    points = [point.take(first + k) for k in range(3)]
+    problem.bind(kernels.ground_wander(), point=points, step=of.steps(first, first + 1))
     disturbed = np.flatnonzero(structure.active[of.disturbed, column])
     if len(disturbed):
         knots = of.disturbed[disturbed]

@@ -177,12 +177,12 @@ def ground_rolling(kind: type[Body]) -> Kernel:
 
 @cache
 def ground_wander() -> Kernel:
-    """How evenly the contact with the ground moves along the object over three knots."""
+    """How much faster or slower the contact with the ground moves along the object from one interval to the next."""
     kernel = Kernel("ground_wander")
     points = [kernel.variable(f"point{i}", 3, "point", i) for i in range(3)]
     steps = [kernel.parameter(f"step{i}", 1, "step", i) for i in range(2)]
-    rates = [(after - before) / step for before, after, step in zip(points[:-1], points[1:], steps, strict=True)]
-    kernel.cost(contact.GROUND_WANDER, rates[1] - rates[0])
+    before, after = (derivative(points[i : i + 2], steps[i : i + 1]) for i in range(2))
+    kernel.cost(contact.GROUND_WANDER, after - before)
     return kernel
 
 

@@ -254,6 +254,20 @@ def test_contacts_that_touch_only_at_the_end_do_not_roll() -> None:
         assert len(values[name]) == rows
 
 
+def test_the_ground_s_contact_wanders_only_while_it_touches() -> None:
+    _, model = everything()
+    times, bounds = model.schedule.samples, (2, len(model.schedule.samples) - 4)
+    lifted = MadeUp(model, (0, 2), lifted={3: bounds})
+    points, weights = lifted.values["point"][:, 6:9], dict.fromkeys(lifted.stage.problem.terms, 1.0)
+    found = lifted.stage.solver.evaluate(lifted.values, lifted.parameters(weights))  # type: ignore[arg-type]
+    rates = np.diff(points, axis=0) / np.diff(times)[:, None]
+    away = set(range(*bounds))
+    alone = [k for k in range(len(times) - 2) if not away & {k, k + 1}]
+    assert 0 < len(alone) < len(times) - 4
+    expected = sum(((rates[k + 1] - rates[k]) ** 2).sum() for k in alone)
+    assert found["ground_wander"] == pytest.approx(expected, rel=1e-12)
+
+
 def test_a_drawing_s_tool_is_held_to_its_path_at_every_knot(drawn: MadeUp) -> None:
     model, position = drawn.model, drawn.values["pose"][:, :3]
     tool = np.array([p + r.apply(model.tool) for p, r in zip(position, drawn.turns, strict=True)])
@@ -275,7 +289,7 @@ def test_every_weight_moves_its_own_term(case: MadeUp) -> None:
     weights = {
         name: WEIGHTS[name] or 1.0 for name in case.stage.problem.terms
     }  # the proximal term weighs in restorations only
-    # Second forces are there for disturbances alone, the ground's load and shared motors where there are any.
+    # Second forces are there for disturbances alone, the ground's terms and those of shared motors where there are any.
     on_ground = case.stage.problem.variables["force"].shape[1] == 9
     absent = {"motor_acceleration"} | (set() if on_ground else {"ground_load", "ground_wander"})
     assert set(WEIGHTS) - set(weights) == absent | ({"force_regularisation"} if case.model.tool is not None else set())
