@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 ENDED = "ended.json"
 """Written into a folder whose solve did not end by itself: ``{"how": sentence, "minutes": limit or null}``."""
+STOPPED = "stopped after"
+"""What the sentence on a solve that took too long begins with."""
 LOG = "solve.log"
 
 
@@ -108,7 +110,7 @@ def _work(task: Task, folder: Path, until: Stage, jobs: int | None) -> None:
 def _how(code: int | None, log: Path, limit: float | None) -> str:
     """A sentence on a process that has not ended, or not well; else empty."""
     if code is None:
-        return f"stopped after {limit:g} min"
+        return f"{STOPPED} {limit:g} min"
     if code == 0:
         return ""
     if code < 0:

@@ -4,8 +4,8 @@
 
 Each ends certified, feasible for what replays in MuJoCo or the audit say, or failed with a reason; a file that is no
 task is refused with a message. Nothing else may happen: the exit status is 1 where a solve crashed, was ended after
-``--limit`` minutes on the clock, or gave a reason that says nothing to a person. What was solved is kept in ``--out``
-and not solved again.
+``--limit`` minutes on the clock with no certified hand, or gave a reason that says nothing to a person. What was
+solved is kept in ``--out`` and not solved again; what was ended, only with a longer limit.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from apart import ended
+from apart import STOPPED, ended
 from extremes import faults
 from random_tasks import random_task
 from shared import kept_solve, options_of, write_table
@@ -74,6 +74,9 @@ def way_of(design: Design, how: str) -> tuple[str, str]:
         design: what it left.
         how: what was done to it where it did not end by itself.
     """
+    stopped = how.startswith(STOPPED)
+    if stopped and design.status == "certified":
+        return WAYS[0], f"{how}, while a hand of fewer joints or better figures was looked for"
     wrong = [how] if how else faults(design)
     if wrong:
         return ELSE, "; ".join(wrong)

@@ -35,3 +35,11 @@ def browser() -> Iterator[Any]:
 
     with Browser() as found:
         yield found
+
+
+@pytest.fixture(scope="module")
+def interpreted() -> Iterator[None]:
+    """No compiler, for modules that build large problems and hardly evaluate them: to compile those takes a minute."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("casadi_hands.nlp.machine_code.compiler", lambda: None)
+        yield

@@ -21,6 +21,8 @@ from tests.stages.example import made_up_solution
 from tests.stages.refining import carrying, sketching
 from tests.stages.synthesis.example import BALL
 
+pytestmark = pytest.mark.usefixtures("interpreted")
+
 # Half an extent is 3 cm, the weight 0.1 · 9.81 N; samples are 0.1 s apart.
 TORQUE_UNIT = 0.1 * 9.81 * 0.03
 

@@ -19,6 +19,8 @@ from tests.stages.blocks import frames, numbers, surface
 from tests.stages.example import check_derivatives, doubling_each_weight, drawing, everything, rod, with_tips
 from tests.stages.refining import MadeUp, carrying, sketching
 
+pytestmark = pytest.mark.usefixtures("interpreted")
+
 Array = np.ndarray
 
 

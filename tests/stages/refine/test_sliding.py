@@ -26,6 +26,8 @@ from tests.stages.example import everything, everything_text
 from tests.stages.refine.test_finger_kernels import BALL, TIP, Block, on_cap, rolling_block
 from tests.stages.refining import MadeUp
 
+pytestmark = pytest.mark.usefixtures("interpreted")
+
 Array = np.ndarray
 FRICTION, MARGIN, SCALE = 0.6, 0.5, 0.01
 

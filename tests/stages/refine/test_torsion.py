@@ -34,6 +34,8 @@ from casadi_hands.verify.trajectory import build_trajectory
 from tests.stages.blocks import check_block, numbers, packed, surface
 from tests.stages.example import everything_text
 
+pytestmark = pytest.mark.usefixtures("interpreted")
+
 Array = np.ndarray
 BODIES = [np.array([0.1, -0.2, -0.8, 0.0, 0.3, 0.9, 0.5]), np.array([0.3, 0.1, -0.2, 0.6])]  # a capsule, a sphere
 KINDS = (Capsule, Sphere)

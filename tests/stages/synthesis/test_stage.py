@@ -36,6 +36,8 @@ from tests.stages.example import (
     with_tips,
 )
 
+pytestmark = pytest.mark.usefixtures("interpreted")
+
 Array = np.ndarray
 MARGIN = 0.03  # clearance asked of what need not touch, lengths
 JOINTS = (1, 2, 3)

@@ -42,6 +42,8 @@ from tests.stages.example import (
 from tests.stages.object_motion.test_kernels import ALL_TERMS, WEIGHT_OF
 from tests.stages.object_motion.test_kernels import Witness as ObjectWitness
 
+pytestmark = pytest.mark.usefixtures("interpreted")
+
 Array = np.ndarray
 MARGIN = 0.03
 CONTACTS, JOINTS, SEEDS = (0, 1, 2), (1, 2, 3), (0, 1, 4)
