@@ -170,15 +170,16 @@ def _add_shape(scene: Any, name: str, shape: Shape, solid: bool) -> Any:
     if not solid:
         return _add_plain(scene, name, shape.thinner, GOAL_COLOR, 0.25)
     import trimesh
+    from trimesh.visual import TextureVisuals
+    from trimesh.visual.material import PBRMaterial
 
     mesh = two_toned(shape)
-    solid_mesh = trimesh.Trimesh(
-        mesh.vertices,
-        mesh.faces,
-        vertex_normals=mesh.normals,
-        vertex_colors=np.round(255 * mesh.color**_GAMMA).astype(np.uint8),
-        process=False,
-    )
+    opaque = np.ones((len(mesh.vertices), 1))
+    # Without a material it would be of metal, which is black where there is nothing to mirror.
+    material = PBRMaterial(metallicFactor=0.0, roughnessFactor=0.8)  # type: ignore[no-untyped-call]
+    look = TextureVisuals(material=material)  # type: ignore[no-untyped-call]
+    look.vertex_attributes["color"] = np.round(255 * np.hstack([mesh.color**_GAMMA, opaque])).astype(np.uint8)
+    solid_mesh = trimesh.Trimesh(mesh.vertices, mesh.faces, vertex_normals=mesh.normals, visual=look, process=False)
     return scene.add_mesh_trimesh(name, solid_mesh, **_pose(shape.placement))
 
 

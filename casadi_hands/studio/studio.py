@@ -47,7 +47,8 @@ class Studio:
         gui = server.gui
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
         server.scene.world_axes.visible = False
-        server.scene.configure_environment_map("studio", environment_intensity=0.35)
+        server.scene.configure_environment_map(None)  # a browser without a graphics card would stand still for seconds
+        server.scene.add_light_hemisphere("light", intensity=2.0)
         self._drawing = TaskDrawing(server.scene, lambda place: self.choose(place.path))
         self._add_file(gui)
         self._besides = gui.add_html("")  # what the file's panel says, where that may be folded up
