@@ -1,7 +1,8 @@
 """Values as bytes and back, bit for bit, by a format that can hold data and nothing that runs.
 
-A zip file as NumPy writes them: arrays, and a tree of all else in JSON. Objects are the package's own data classes and
-named tuples, made anew of their fields; what was one object in several places is one again.
+A zip file as NumPy writes them: the content of all arrays, end to end, and a tree of all else in JSON. Objects are the
+package's own data classes and named tuples, made anew of their fields; what was one object in several places is one
+again.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from typing import Any
 import numpy as np
 
 _PACKAGE = __name__.partition(".")[0]
-_TREE = "tree"
+_TREE, _CONTENT = "tree", "content"
+_KINDS = "biufcSU"  # of NumPy's types: numbers, truth, and words
 _LARGEST = 2**30  # bytes, unpacked: a solve's units have millions at most
 
 
@@ -39,8 +41,9 @@ def pack(value: Any) -> bytes:
     root = packer.add(value)
     tree = json.dumps([root, packer.nodes]).encode()
     file = io.BytesIO()
-    arrays = {f"a{k}": array for k, array in enumerate(packer.arrays)}
-    np.savez(file, **{_TREE: np.frombuffer(tree, np.uint8)}, **arrays)  # type: ignore[arg-type]
+    # An array each would take longer to read than the stages of a small task take to be built.
+    parts = {_TREE: tree, _CONTENT: b"".join(packer.content)}
+    np.savez(file, **{name: np.frombuffer(data, np.uint8) for name, data in parts.items()})  # type: ignore[arg-type]
     return file.getvalue()
 
 
@@ -55,9 +58,9 @@ def unpack(data: bytes) -> Any:
             if sum(entry.file_size for entry in archive.infolist()) > _LARGEST:
                 raise ValueError("it is too large")
         with np.load(io.BytesIO(data), allow_pickle=False) as file:
-            stored = {name: file[name] for name in file.files}
-        root, nodes = json.loads(stored[_TREE].tobytes())
-        return _Unpacker(nodes, stored).value(root)
+            tree, content = file[_TREE].tobytes(), file[_CONTENT].tobytes()
+        root, nodes = json.loads(tree)
+        return _Unpacker(nodes, content).value(root)
     except (
         OSError,
         EOFError,
@@ -78,7 +81,8 @@ class _Packer:
 
     def __init__(self) -> None:
         self.nodes: list[Any] = []
-        self.arrays: list[np.ndarray] = []
+        self.content: list[bytes] = []
+        self._length = 0
         self._known: dict[int, int] = {}
         self._alive: list[Any] = []  # while it is packed: the numbers of objects are used again
 
@@ -95,9 +99,9 @@ class _Packer:
 
     def _node(self, value: Any) -> list[Any]:
         kind = type(value)
-        if kind is np.ndarray and not value.dtype.hasobject:
+        if kind is np.ndarray and value.dtype.kind in _KINDS:
             return ["array", *self._array(value)]
-        if isinstance(value, np.generic) and not value.dtype.hasobject:
+        if isinstance(value, np.generic) and value.dtype.kind in _KINDS:
             return ["scalar", *self._array(np.asarray(value))]
         if kind in (list, tuple):
             return [kind.__name__, [self.add(item) for item in value]]
@@ -114,15 +118,18 @@ class _Packer:
         raise TypeError(f"{kind.__module__}.{kind.__qualname__} cannot be stored")
 
     def _array(self, array: np.ndarray) -> list[Any]:
-        """The number of an array, stored in the order of its axes in memory, and that order."""
+        """Type, place and shape of an array's content, in the order of its axes in memory, and that order."""
         order = sorted(range(array.ndim), key=lambda axis: -abs(array.strides[axis]))
-        self.arrays.append(np.ascontiguousarray(array.transpose(order)).reshape([array.shape[k] for k in order]))
-        return [len(self.arrays) - 1, order]
+        stored = array.transpose(order)
+        place = self._length
+        self.content.append(stored.tobytes())
+        self._length += array.nbytes
+        return [array.dtype.str, place, stored.shape, order]
 
 
 class _Unpacker:
-    def __init__(self, nodes: list[Any], arrays: Mapping[str, np.ndarray]) -> None:
-        self._nodes, self._arrays = nodes, arrays
+    def __init__(self, nodes: list[Any], content: bytes) -> None:
+        self._nodes, self._content = nodes, content
         self._made: list[Any] = []
 
     def value(self, root: Any) -> Any:
@@ -139,8 +146,10 @@ class _Unpacker:
 
     def _object(self, node: list[Any]) -> Any:
         match node:
-            case ["array" | "scalar" as kind, number, order]:
-                stored = self._arrays[f"a{number}"]
+            case ["array" | "scalar" as kind, str(dtype), place, shape, order]:
+                if np.dtype(dtype).kind not in _KINDS or not np.dtype(dtype).itemsize or place < 0:
+                    raise ValueError(f"an array of {dtype[:40]} at {place}")
+                stored = np.ndarray(shape, dtype, self._content, place).copy()  # its own, as all arrays are
                 array = stored.transpose(np.argsort(order)) if len(order) > 1 else stored
                 return array if kind == "array" else array[()]
             case ["list", items]:

@@ -22,9 +22,13 @@ from casadi_hands.task import load_task
 PROBLEMS = sorted((Path(__file__).parents[2] / "problems").rglob("*.yaml"))
 
 
-def forged(root: Any, nodes: Any, **arrays: np.ndarray) -> bytes:
+def forged(root: Any, nodes: Any, content: bytes = b"") -> bytes:
     file = io.BytesIO()
-    np.savez(file, tree=np.frombuffer(json.dumps([root, nodes]).encode(), np.uint8), **arrays)  # type: ignore[arg-type]
+    np.savez(
+        file,
+        tree=np.frombuffer(json.dumps([root, nodes]).encode(), np.uint8),
+        content=np.frombuffer(content, np.uint8),
+    )
     return file.getvalue()
 
 
@@ -40,6 +44,10 @@ def test_values_come_back_as_they_were() -> None:
     assert type(found[1, 2]) is np.float64
     assert found[1, 2] == 0.1 + 0.2
     assert math.isnan(unpack(pack(math.nan)))
+    for array in (np.array(["a", "längst"]), np.array([True, False]), np.array(3), np.zeros((0, 3)), np.uint8([7])):
+        again = unpack(pack([array]))[0]
+        np.testing.assert_array_equal(again, array, strict=True)
+        assert again.flags.writeable
     np.testing.assert_array_equal(found["b"][1], shared.T)
     same = unpack(pack((shared, [shared])))
     assert same[0] is same[1][0]
@@ -92,6 +100,11 @@ def test_nothing_that_runs_comes_back(tmp_path: Path) -> None:
         forged([0], [["object", ["casadi_hands.export.folder", "remove_design"], {"directory": "."}]]),
         forged([3], []),
         forged([0], [["list", [[0]]]]),
+        forged([0], [["array", "|O", 0, [1], [0]]], bytes(8)),
+        forged([0], [["array", "<f8", 0, [2], [0]]], bytes(8)),
+        forged([0], [["array", "<f8", -8, [1], [0]]], bytes(8)),
+        forged([0], [["array", "<f8", 0, [2**62, 2**62], [0, 1]]], bytes(8)),
+        forged([0], [["array", "<U0", 0, [2**62], [0]]], bytes(8)),
         pack([1.0, 2.0])[:-7],
         b"",
     ):
