@@ -39,6 +39,8 @@ from tests.stages.example import (
     spline_at,
 )
 
+pytestmark = pytest.mark.usefixtures("interpreted")
+
 Array = np.ndarray
 GROUND_TERMS = {"ground_friction_cone", "contact_on_ground", "slip_on_ground"}
 FORCE_TERMS = {

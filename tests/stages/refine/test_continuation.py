@@ -20,6 +20,8 @@ from casadi_hands.stages.refine.values import Margin
 from tests.stages.example import everything, made_up_solution, standing
 from tests.stages.refining import carrying
 
+pytestmark = pytest.mark.usefixtures("interpreted")
+
 MODEL = standing(everything()[1])
 LEVELS = {
     "sparse": resampled_model(MODEL, MODEL.schedule.stepped(0.4)),

@@ -20,6 +20,8 @@ from casadi_hands.stages.refine.stage import RefineStage
 from casadi_hands.task import parse_task
 from tests.stages.blocks import numbers
 
+pytestmark = pytest.mark.usefixtures("interpreted")
+
 CRATE = """\
 object: {mass: 0.05, shapes: [{box: {size: [0.04, 0.04, 0.06], edge_radius: 0.001}}]}
 palm: {radius: 0.05, position: [0, 0, 0.2], facing: [0, 0, -1]}

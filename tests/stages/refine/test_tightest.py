@@ -16,6 +16,8 @@ from casadi_hands.task import parse_task
 from tests.stages.refining import MadeUp, carrying
 from tests.stages.synthesis.example import BALL
 
+pytestmark = pytest.mark.usefixtures("interpreted")
+
 
 @pytest.fixture(scope="module")
 def made() -> MadeUp:
