@@ -124,11 +124,24 @@ def _check_structure(earlier: Design, hand: Hand, task: Task) -> None:
     }.items():
         if was != now:
             differing.append(f"{name}: {was} there, {now} in the task")
+    if not differing:
+        differing = [text for name in task.fingers if (text := _other_regrasps(earlier.task, task, name))]
     joints = max(len(finger.links) for finger in hand.fingers)
     if joints > task.search.max_joints:
         differing.append(f"joints of a finger: {joints} there, at most {task.search.max_joints} in the task")
     if differing:
         raise SolveError(_refused("; ".join(differing), earlier))
+
+
+def _other_regrasps(before: Task, after: Task, name: str) -> str:
+    """Say that a finger lets go at other times than it did, moved as the goals have; empty where it does not."""
+    was, now = (np.ravel([each.times for each in task.fingers[name].regrasps or ()]) for task in (before, after))
+    there, here = ([goal.at for goal in task.motion] for task in (before, after))
+    was = np.interp(was, there, here)
+    if len(was) == len(now) and np.all(np.abs(was - now) < after.time_step):
+        return ""
+    lifts = (", ".join(f"{time:g} s" for time in times[:6:2]) or "never" for times in (was, now))
+    return f"when finger {name!r} lets go: {{}} there, {{}} in the task".format(*lifts)
 
 
 def _refused(why: str, earlier: Design) -> str:

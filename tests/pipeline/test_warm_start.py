@@ -12,7 +12,7 @@ from casadi_hands.errors import SolveError
 from casadi_hands.export.design import Design
 from casadi_hands.pipeline.earlier_motion import continuous_vectors
 from casadi_hands.pipeline.margins import SMALL, Margins, margins_for
-from casadi_hands.pipeline.warm_start import as_floating, kept_margin, warm_start
+from casadi_hands.pipeline.warm_start import _other_regrasps, as_floating, kept_margin, warm_start
 from casadi_hands.problem.hand_motion import WholeHand
 from casadi_hands.problem.motion import Motion
 from casadi_hands.problem.outcome import whole_hand_motion
@@ -23,6 +23,9 @@ from tests.export.example import BASES, HEIGHT, LENGTHS, TASK, example_hand, exa
 # One keyframe between goals puts the samples where the motion's are.
 HELD = TASK.replace("ground: {height: 0.2, friction: 0.8}\n", "keyframes_between: 1\nhand: {link_radius: 0.008}\n")
 LENGTH, WEIGHT = 0.06, 0.1 * 9.81  # characteristic length and weight of the capsule
+
+
+LIFTS = "  index: {{touches: [0, -0.02, 0.02], regrasps: [{{from: {}, to: {}, touches: [0, -0.02, 0.02]}}]}}"
 
 
 def edited(*changes: str) -> str:
@@ -295,6 +298,10 @@ GOAL = "  - {at: 2, position: [0.075, 0, 0.3]}\n"
             ["number of goals: 3 there, 4 in the task"],
         ),
         (["ground: {height: 0.2}"], ["ground: none there, one in the task"]),
+        (
+            ["  index: {touches: [0, -0.02, 0.02]} -> " + LIFTS.format(0.5, 0.9)],
+            ["when finger 'index' lets go: never there, 0.5 s in the task"],
+        ),
         (["facing: [1, 0, 0] -> facing: [1, 0, 0], moves: true"], ["palm: where the task has it there, moved by"]),
         (["search: {max_joints: 1}"], ["joints of a finger: 2 there, at most 1 in the task"]),
         (
@@ -311,6 +318,16 @@ def test_another_structure_is_refused_in_one_message(changes: list[str], words: 
     assert text.startswith("the earlier result, of 'move a capsule & back', is no start for this task: ")
     assert text.endswith("; solving without --from works")
     assert all(word in text for word in words), text
+
+
+def test_fingers_may_let_go_where_goals_have_moved_to() -> None:
+    index = "  index: {touches: [0, -0.02, 0.02]} -> "
+    before = parse_task(edited(index + LIFTS.format(0.4, 0.8)))
+    slower = ["at: 1, -> at: 2,", "at: 2, position: [0.075 -> at: 4, position: [0.075"]
+    for start, end, words in ((0.8, 1.6, ""), (0.4, 0.8, "0.8 s there, 0.4 s in the task")):
+        after = parse_task(edited(index + LIFTS.format(start, end), *reversed(slower)))
+        assert _other_regrasps(before, after, "index").endswith(words)
+        assert bool(words) == bool(_other_regrasps(before, after, "index"))
 
 
 def test_drawings_and_poses_are_no_start_for_each_other() -> None:
