@@ -120,8 +120,7 @@ class _Packer:
     def _array(self, array: np.ndarray) -> list[Any]:
         """Type, place and shape of an array's content, in the order of its axes in memory, and that order."""
         order = sorted(range(array.ndim), key=lambda axis: -abs(array.strides[axis]))
-        stored = array.transpose(order)
-        place = self._length
+        stored, place = array.transpose(order), self._length
         self.content.append(stored.tobytes())
         self._length += array.nbytes
         return [array.dtype.str, place, stored.shape, order]
@@ -146,9 +145,10 @@ class _Unpacker:
 
     def _object(self, node: list[Any]) -> Any:
         match node:
-            case ["array" | "scalar" as kind, str(dtype), place, shape, order]:
-                if np.dtype(dtype).kind not in _KINDS or not np.dtype(dtype).itemsize or place < 0:
-                    raise ValueError(f"an array of {dtype[:40]} at {place}")
+            case ["array" | "scalar" as kind, str(name), place, shape, order]:
+                dtype = np.dtype(name)
+                if dtype.kind not in _KINDS or not dtype.itemsize or place < 0:
+                    raise ValueError(f"an array of {name[:40]} at {place}")
                 stored = np.ndarray(shape, dtype, self._content, place).copy()  # its own, as all arrays are
                 array = stored.transpose(np.argsort(order)) if len(order) > 1 else stored
                 return array if kind == "array" else array[()]

@@ -34,8 +34,6 @@ from casadi_hands.stages.whole_hand.stage import WholeHandStage
 from casadi_hands.task import load_task
 from tests.stages.example import drawing, everything, made_up_floating
 
-pytestmark = pytest.mark.usefixtures("interpreted")
-
 
 @dataclass(frozen=True)
 class Call:

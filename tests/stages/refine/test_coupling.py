@@ -16,8 +16,6 @@ from casadi_hands.stages.refine.problem import RefineProblem
 from tests.stages.blocks import Place, check_block, frames, numbers, random_finger, shape, surface
 from tests.stages.example import PinFinger, everything, nearest_on_axis
 
-pytestmark = pytest.mark.usefixtures("interpreted")
-
 Array = np.ndarray
 LINK, RADIUS, HINGE, STIFFNESS, TORSION, MOTORS = 0.15, 0.2, 0.42, 3.0, 0.4, 2
 

@@ -13,8 +13,6 @@ from casadi_hands.motion import Schedule
 from casadi_hands.stages.refine.initial_guess import balanced, disturbance_wrenches, rates_and_wrenches
 from tests.stages.example import everything
 
-pytestmark = pytest.mark.usefixtures("interpreted")
-
 Array = np.ndarray
 DURATION = 1.5
 

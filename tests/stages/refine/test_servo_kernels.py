@@ -24,8 +24,6 @@ from casadi_hands.task.servos import SERVOS
 from tests.stages.blocks import Place, between, check_block, frames, numbers, random_finger, shape
 from tests.stages.example import PinFinger, everything, everything_text, g, palm_apart
 
-pytestmark = pytest.mark.usefixtures("interpreted")
-
 Array = np.ndarray
 RADIUS, THICK, SERVO, PALM_RADIUS, GROUND, MARGIN = 0.1, 0.16, 0.25, 1.2, -0.4, 0.03
 
