@@ -6,9 +6,9 @@ Choices a reader of the file should know:
   ``palm_target``: whoever replays the motion moves the target. A mocap palm alone would have no velocity in the
   solver's eyes, and friction would hold the object back.
 - **Contact.** Elliptic cones, four dimensions. The task's friction holds wherever the object touches the hand, the
-  ground's wherever anything touches the ground. Fingertips are soft: they have the task's torsional friction, and the
-  contact gives over 2 % of the object's size. Creep, an artefact of
-  MuJoCo's regularised friction, is held down by ``impratio`` and the no-slip pass.
+  ground's wherever anything touches the ground. Fingertips are soft: they have the task's torsional friction, and give
+  like rubber (see `casadi_hands.export.compliance`). Creep, an artefact of MuJoCo's regularised friction, is held down
+  by ``impratio`` and the no-slip pass.
 - **Motors.** See `casadi_hands.problem.motors`; torque is limited to the hand's effort. The hand carries its own weight
   (``gravcomp``), as a controller that knows its hand does. Targets are not clamped, so that a feed-forward torque can
   be given as an offset of the target (see `casadi_hands.export.commands`).
@@ -34,6 +34,7 @@ from scipy.spatial.transform import Rotation
 
 from casadi_hands.export.attached import add_joints, couple, object_coordinates
 from casadi_hands.export.commands import commanded
+from casadi_hands.export.compliance import IMPEDANCE, contact_time
 from casadi_hands.export.markup import (
     GROUND_COLOR,
     OBJECT_COLOR,
@@ -56,7 +57,6 @@ if TYPE_CHECKING:
 
 _TIME_STEP = 0.001  # s
 _IMPRATIO, _NO_SLIP = "100", "20"  # harder friction changes little any more (``scripts/creep.py``)
-_USUAL_FORCE = 2.0  # weights with which contacts press: where more, they are stiffer
 _SOFTNESS = 0.02  # depth over which a contact stiffens, of the characteristic length
 _STILL = 1e-9  # a palm that moves less, relative to its size (or in its quaternion), stands still
 
@@ -78,7 +78,7 @@ def scene_mjcf(task: Task, hand: Hand, motion: Motion) -> str:
     moves = _palm_moves(hand, motion)
     motors = joint_motors(task, hand)
     root = Element("mujoco", model=task.name)
-    _add_settings(root, task, float(np.linalg.norm(motion.contact_force, axis=2).max(initial=0.0)))
+    _add_settings(root, task, contact_time(task, hand, motion, motors, moves, 2 * _TIME_STEP))
     add_meshes(root, task)
     world = SubElement(root, "worldbody")
     SubElement(world, "light", pos=numbers(motion.object_position[0] + [0, 0, 20 * task.object.characteristic_length]))
@@ -120,8 +120,8 @@ def _palm_moves(hand: Hand, motion: Motion) -> bool:
     return bool(shift > _STILL or turn > _STILL)
 
 
-def _add_settings(root: Element, task: Task, force: float) -> None:
-    """Add solver options and the defaults of contacts, the largest of whose planned forces is ``force`` (N)."""
+def _add_settings(root: Element, task: Task, give: float) -> None:
+    """Add solver options and the defaults of contacts, whose time constant is ``give`` (s)."""
     SubElement(root, "compiler", angle="radian")
     SubElement(
         root,
@@ -136,14 +136,10 @@ def _add_settings(root: Element, task: Task, force: float) -> None:
     extent = 8 * task.object.characteristic_length
     center = task.palm.position
     SubElement(root, "statistic", extent=number(extent), center=numbers(center), meansize=number(extent / 20))
-    # Where forces are larger than weights, contacts are as much stiffer: they give as the square of this time, in s.
-    weight = task.object.mass * (float(np.linalg.norm(task.gravity)) or 9.81)
-    share = weight / max(task.force_unit, force / _USUAL_FORCE)
-    give = max(0.01 * float(np.sqrt(min(share, 1.0))), 2 * _TIME_STEP)
     geom = {
         "condim": "4",
         "solref": f"{number(give)} 1",
-        "solimp": f"0.9 0.95 {number(_SOFTNESS * task.object.characteristic_length)}",
+        "solimp": numbers((*IMPEDANCE, _SOFTNESS * task.object.characteristic_length)),
     }
     SubElement(SubElement(root, "default"), "geom", geom)
 

@@ -257,13 +257,3 @@ def test_there_is_no_ground_where_the_task_has_none():
     task = parse_task(TASK.replace("ground: {height: 0.2, friction: 0.8}", ""))
     model = scene(task=task)
     assert "ground" not in names(model, mujoco.mjtObj.mjOBJ_GEOM, model.ngeom)
-
-
-@pytest.mark.parametrize(("weights", "give"), [(1.0, 0.01), (2.0, 0.01), (8.0, 0.005), (1000.0, 0.002)])
-def test_contacts_that_press_harder_are_stiffer(weights, give):
-    """In proportion to their forces, so that they give as much, down to what the time step allows."""
-    motion, weight = example_motion(), example_task().object.mass * 9.81
-    force = np.zeros_like(motion.contact_force)
-    force[0, 0, 1] = weights * weight
-    model = scene(motion=replace(motion, contact_force=force))
-    np.testing.assert_allclose(model.geom_solref[:, 0], give, rtol=1e-6)

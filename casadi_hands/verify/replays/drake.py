@@ -19,17 +19,15 @@ What means the same as in ``scene.xml``:
 What does not:
 
 - *Contacts* are patches of pressure that grow with depth (Drake's hydroelastic contact), not points: Drake's points
-  have no torsional friction, and what two fingertips hold would spin freely. MuJoCo's contacts stiffen within 2 % of
-  the object's half extent and are as stiff as the masses behind them are heavy; these know neither depth nor mass. The
+  have no torsional friction, and what two fingertips hold would spin freely. MuJoCo's contacts in ``scene.xml`` give
+  like rubber under the planned forces, and are as stiff as the masses behind them are heavy; these know no mass. The
   pressure's gradient is such that six times the object's weight, or three times the largest planned force if that is
-  more, makes a patch of 0.375 of the fingertip's radius. In ``scene.xml`` forces of more than two weights stiffen
-  contacts likewise. Fingertips then give as in MuJoCo: by 0.2 to 1 mm in the designs measured before that, the two
-  within a factor of 1.6 or so.
+  more, makes a patch of 0.375 of the fingertip's radius.
 - *Torsional friction* is what such a patch has by itself, (8/15)·μ·radius of the patch: as much as MuJoCo's at the
   force just named where the task has a rubber fingertip's, and with the fourth root of the force less below it, usually
   0.6 to 1 of MuJoCo's. It is no number that could be given: whatever else the task says of torsion is not played, and
   neither are perturbations of it (`can_play`), which are refused.
-- *Damping* in contacts is Hunt and Crossley's, with MuJoCo's relaxation time, 0.02 s, at that patch's depth. It never
+- *Damping* in contacts is Hunt and Crossley's, with a relaxation time of 0.02 s at that patch's depth. It never
   pulls.
 - *The ground* is rigid, and a patch on it resists twisting; in ``scene.xml`` nothing does there.
 - *Stiction* creeps by some 0.01 mm/s; in ``scene.xml`` a pass of MuJoCo's own takes that back.

@@ -11,8 +11,8 @@ Why this is fair to a real hand, as ``scene.xml`` has it:
 
 - *Motors* are springs about their set points, as stiff as the task says, and critically damped. The hand carries its
   own weight, as a controller that knows its hand does.
-- *Contacts* are soft (a fingertip gives by a share of the object's size), with the task's Coulomb and torsional
-  friction. The plan counts on the torsion as the audit says, and not on the softness.
+- *Contacts* are soft (a fingertip gives like rubber), with the task's Coulomb and torsional friction. The plan counts
+  on the torsion as the audit says, and not on the softness.
 - *Nothing is fed back* from the object, so an error made is never corrected: a real controller can only do better.
 """
 
