@@ -196,12 +196,13 @@ class Refiner:
     ) -> tuple[Design, Refined]:
         """A motion replayed or, where it turns off a goal by more than ``most`` degrees, the best of it and others.
 
-        Those resist slower spins in full, and slower ones again where that leaves it beyond the limit.
+        Those resist slower spins in full, and slower ones again where that leaves it beyond the limit. What the hand
+        drops asks for another grip.
         """
         judged, refined, stage = found
         judged = self._replayed(judged)
         best, latest = (judged, refined), refined
-        if not refined.exact or not self.model.torsion or judged.replay_angle <= most:
+        if not refined.exact or not self.model.torsion or judged.replay_angle <= most or judged.drops_as_planned:
             return best
         for sharpness in range(refined.sharpness + 1, stage.sharpest + 1):
             if best[0].replay_angle <= most or not latest.exact:

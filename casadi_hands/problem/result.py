@@ -60,7 +60,12 @@ class Result:
         if not self.replays:
             return None
         first = self.replays[0]
-        return int(first["of"] if first["dropped_as_planned"] else first["dropped"])
+        return int(first["of"] if self.drops_as_planned else first["dropped"])
+
+    @property
+    def drops_as_planned(self) -> bool:
+        """Whether the object is dropped even with nothing perturbed."""
+        return bool(self.replays) and bool(self.replays[0]["dropped_as_planned"])
 
     @property
     def least_stiffness(self) -> float:
@@ -85,7 +90,7 @@ class Result:
             return ""
         first = self.replays[0]
         planned = "drops the object as planned"
-        if not first["dropped_as_planned"]:
+        if not self.drops_as_planned:
             mean = {unit: math.nan if value is None else value for unit, value in first["mean"].items()}
             planned = f"{mean['mm']:.2g} mm and {mean['degrees']:.2g}° off plan on average"
         dropping = [name for name, each in first.get("perturbed", {}).items() if each["dropped"]]

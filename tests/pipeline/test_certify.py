@@ -27,7 +27,7 @@ from casadi_hands.stages.refine.values import Margin
 from casadi_hands.stages.synthesis.algorithm import Candidate, Found
 from casadi_hands.task import parse_task
 from casadi_hands.verify.report import Audit, Figure
-from tests.pipeline.replayed import replayed
+from tests.pipeline.replayed import OF, replayed
 from tests.stages.example import made_up_solution
 from tests.stages.synthesis.example import ball_target, ball_task, hand, pointing
 
@@ -648,6 +648,12 @@ def test_slower_and_slower_spins_are_resisted_until_the_replay_keeps_its_goals(
     sharper = [("sharpened", AMPLE), ("sharpened to 2", AMPLE)][: len(angles) - 1]
     again = [("with_margin", LARGE), *((name, LARGE) for name, _ in sharper)]
     assert ways.asked == [("solve", AMPLE), *sharper, *(again if more else [])]
+
+
+def test_where_the_replay_as_planned_drops_another_grip_comes_before_spins(monkeypatch: pytest.MonkeyPatch) -> None:
+    ways = Ways(firm=False)
+    refine(monkeypatch, ways, 1.0, ["certified"] * 3, [OF, 0, 0], angles=[40.0, 9.0, 2.0], soft=True)
+    assert ways.asked == [("solve", AMPLE), ("with_margin", LARGE), ("sharpened", LARGE)]
 
 
 def test_spins_are_resisted_as_far_as_motions_are_exact(monkeypatch: pytest.MonkeyPatch) -> None:
