@@ -10,7 +10,10 @@ OF = 20
 
 
 def replayed(design: Design, drops: int) -> Design:
-    """A design whose files hold or not, and whose perturbed replays drop the object so often; all of them, and as planned, too."""
+    """A design whose files hold or not, and whose perturbed replays drop the object so often.
+
+    Where all of them do, so does the one as planned.
+    """
     few = drops <= OF / 20
     status = "feasible" if design.status == "certified" and not few else design.status
     entry = {
