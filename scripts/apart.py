@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from casadi_hands.errors import DesignError
 from casadi_hands.export.design import Design
 from casadi_hands.export.place import beside, owned
+from casadi_hands.lifetime import follow_parent
 from casadi_hands.task import Task, task_to_yaml
 
 if TYPE_CHECKING:
@@ -88,8 +89,9 @@ def ended(folder: Path) -> dict[str, Any]:
 
 
 def _work(task: Task, folder: Path, until: Stage, jobs: int | None) -> None:
-    """The solve, in its own process and session: its workers can be ended with it."""
+    """The solve, in its own process and session: its workers can be ended with it, and it ends with its parent."""
     os.setsid()
+    follow_parent()
     log = (folder / LOG).open("w", buffering=1, encoding="utf-8")
     # What crashes below Python writes to the file descriptors.
     for stream in (1, 2):

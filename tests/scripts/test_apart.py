@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -9,6 +12,7 @@ import pytest
 from shared import is_kept, with_seed
 
 from casadi_hands.export.design import Design
+from casadi_hands.task import task_to_yaml
 from tests.export.example import example_task
 
 TASK = example_task()
@@ -51,6 +55,29 @@ def test_solve_beyond_its_limit_leaves_what_it_wrote_and_no_process(
     assert not alive(helper)
     # It is only worth another try with more time.
     assert [is_kept(TASK, tmp_path / "one", limit) for limit in (0.05, 0.1, 0.2, None)] == [True, True, False, False]
+
+
+def test_a_solve_ends_with_the_script_that_began_it(tmp_path: Path) -> None:
+    """However that ends: what it has begun would go on for as long as it takes."""
+    task = task_to_yaml(TASK)
+    program = (
+        "import apart; from pathlib import Path; from casadi_hands.task import parse_task\n"
+        f"if __name__ == '__main__': apart.solve_apart(parse_task({task!r}), Path('one'), 'refine', 1, None)"
+    )
+    (tmp_path / "script.py").write_text(program, encoding="utf-8")
+    paths = os.pathsep.join([str(Path(apart.__file__).parent), *sys.path])
+    script = subprocess.Popen([sys.executable, "script.py"], cwd=tmp_path, env={**os.environ, "PYTHONPATH": paths})
+    log, deadline = tmp_path / "one.part" / apart.LOG, time.monotonic() + 60
+    while not (log.is_file() and log.read_text(encoding="utf-8")) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    solves = [int(each) for each in Path(f"/proc/{script.pid}/task/{script.pid}/children").read_text().split()]
+    script.kill()
+    script.wait()
+    assert solves
+    deadline = time.monotonic() + 5
+    while any(map(alive, solves)) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not any(map(alive, solves))
 
 
 def test_solve_that_crashes_leaves_what_it_wrote(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
