@@ -127,5 +127,24 @@ def test_runs_last_from_touch_to_lift(tmp_path: Path) -> None:
     active = np.zeros((11, 2), dtype=bool)
     active[1:4, 0] = active[8:, 0] = True
     folder = read_folder(plain(read_task(tmp_path, SPHERE), TIME, contact_active=active).write(tmp_path / "result"))
-    assert active_runs(folder, 0) == [(1, 4), (8, 10)]
-    assert active_runs(folder, 1) == []
+    path = build_trajectory(folder, shoot(folder))
+    assert active_runs(folder, path, 0) == [(1, 4), (8, 10)]
+    assert active_runs(folder, path, 1) == []
+
+
+@pytest.mark.parametrize("lifted", [False, True])
+def test_a_contact_that_only_lets_go_has_not_been_lifted(tmp_path: Path, lifted: bool) -> None:
+    """Or its slip would count anew, however far it has come."""
+    folder = _on_ground(tmp_path, 0.06 * TIME, 0 * TIME)
+    arrays = dict(np.load(folder.path / "motion.npz"))
+    arrays["contact_active"][5, 2] = False
+    arrays["time"][6] = arrays["time"][5] + 1e-4  # in which nothing falls far
+    for name in ("object_position", "contact_point_link"):
+        arrays[name][6] = arrays[name][5]
+    if lifted:
+        arrays["object_position"][5, 2] = 2e-3
+    np.savez(folder.path / "motion.npz", **arrays)
+    folder = read_folder(folder.path)
+    path = build_trajectory(folder, shoot(folder))
+    assert active_runs(folder, path, 2) == ([(0, 5), (6, 10)] if lifted else [(0, 10)])
+    assert slip_figure(folder, path).value == pytest.approx(0.03 if lifted else 0.06, abs=1e-4)

@@ -10,12 +10,11 @@ from casadi_hands.verify.checks.drive import scene_drive_problems
 from casadi_hands.verify.checks.keyframes import keyframe_problems
 from casadi_hands.verify.checks.motors import damping_problem, rotor_problems
 from casadi_hands.verify.checks.mount import mount_problems
+from casadi_hands.verify.checks.settings import settings_problems
 from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.reading.scene_file import Scene, SceneBody
 from casadi_hands.verify.reading.stored import same
 
-LONGEST_STEP = 0.005
-"""s of the simulation: contacts stiffen within about 10 ms."""
 EXACT = 1e-6
 
 
@@ -28,6 +27,7 @@ def scene_problems(folder: Folder) -> list[str]:
         return []
     problems = [
         *scene.strange,
+        *settings_problems(folder, scene.settings, palm_moves(folder)),
         *_world_problems(folder, scene),
         *_body_problems(folder, scene),
         *_hold_problems(folder, scene),
@@ -54,8 +54,6 @@ def palm_moves(folder: Folder) -> bool:
 def _world_problems(folder: Folder, scene: Scene) -> list[str]:
     """Gravity, the ground and friction."""
     problems, ground = [], folder.task.ground
-    if not 0.0 < scene.step <= LONGEST_STEP:
-        problems.append(f"steps of {scene.step:g} s are too long for contacts; at most {LONGEST_STEP:g} s")
     if not np.allclose(scene.gravity, folder.gravity, atol=1e-9, rtol=EXACT):
         problems.append(f"gravity is {scene.gravity.tolist()}, in task.yaml {folder.gravity.tolist()}")
     if len(scene.planes) != (0 if ground is None else 1) or any(plane.kind != "plane" for plane in scene.planes):
@@ -70,14 +68,13 @@ def _world_problems(folder: Folder, scene: Scene) -> list[str]:
         if not all(plane.priority > geom.priority for body in scene.bodies.values() for geom in body.geoms):
             problems.append("the ground's friction does not hold where the object touches it")
     for name, body in scene.bodies.items():
-        for geom in body.geoms:
-            slides, twists, rolls = geom.friction
-            if not same(slides, folder.task.friction):
-                problems.append(
-                    f"the friction of {folder.call(name)} is {slides:g}, in task.yaml {folder.task.friction:g}"
-                )
-            if not same(twists, folder.task.fingertip.torsion) or rolls != 0.0:
-                problems.append(f"{folder.call(name)} does not resist turning and rolling as the task's fingertips do")
+        who = folder.call(name)
+        for slides in sorted(
+            {geom.friction[0] for geom in body.geoms if not same(geom.friction[0], folder.task.friction)}
+        ):
+            problems.append(f"the friction of {who} is {slides:g}, in task.yaml {folder.task.friction:g}")
+        if any(not same(geom.friction[1], folder.task.fingertip.torsion) or geom.friction[2] for geom in body.geoms):
+            problems.append(f"{who} does not resist turning and rolling as the task's fingertips do")
     return problems
 
 
@@ -110,8 +107,9 @@ def _body_problems(folder: Folder, scene: Scene) -> list[str]:
         if body.parent != parent:
             problems.append(f"{who} hangs on {body.parent}, not on {parent}")
         problems += _pose_problems(folder, who, body, position, orientation)
-        if body.borne and name not in folder.links:
-            problems.append(f"the weight of {who} is taken off it (gravcomp)")
+        if body.borne != (name in folder.links):
+            taken = "not taken off it, as a hand carries itself" if name in folder.links else "taken off it"
+            problems.append(f"the weight of {who} is {taken} (gravcomp)")
         if name in due:
             problems += _solid_problems(folder, who, body, due[name])
         loose = folder.task.object.attached is None
@@ -128,12 +126,12 @@ def _body_problems(folder: Folder, scene: Scene) -> list[str]:
             continue
         limits = [joint.lower, joint.upper]
         for word, stated, said in (
-            ("axis", hinge.axis, joint.axis),
-            ("limits", hinge.limits, limits),
-            ("angle at the start", hinge.reference, reference),
+            ("axis is not that", hinge.axis, joint.axis),
+            ("limits are not those", hinge.limits, limits),
+            ("angle at the start is not that", hinge.reference, reference),
         ):
             if np.max(np.abs(np.asarray(stated) - np.asarray(said))) > EXACT:
-                problems.append(f"joint {joint.name}: its {word} is not that of the other files")
+                problems.append(f"joint {joint.name}: its {word} of the other files")
     return problems
 
 

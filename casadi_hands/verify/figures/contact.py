@@ -20,13 +20,33 @@ def active_contacts(folder: Folder) -> Iterator[tuple[int, int]]:
     yield from ((int(k), int(c)) for k, c in np.argwhere(folder.motion.contact_active))
 
 
-def active_runs(folder: Folder, contact: int) -> list[tuple[int, int]]:
-    """Return (first, last) samples of every stretch from touch to lift; active from first until last."""
+def active_runs(folder: Folder, path: Trajectory, contact: int) -> list[tuple[int, int]]:
+    """Return (first, last) samples of every stretch from touch to lift; active from first until last.
+
+    A contact that lets go and stays where it was has not been lifted, however short or long that is.
+    """
     active = folder.motion.contact_active[:, contact].astype(int)
     edges = np.diff(np.concatenate([[0], active, [0]]))
     end = len(folder.motion.time) - 1
-    runs = zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True)
-    return [(int(first), min(int(last), end)) for first, last in runs]
+    runs: list[tuple[int, int]] = []
+    for first, last in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
+        run = int(first), min(int(last), end)
+        if runs and not _parts(folder, path, contact, runs[-1][1], run[0]):
+            run = runs.pop()[0], run[1]
+        runs.append(run)
+    return runs
+
+
+def _parts(folder: Folder, path: Trajectory, contact: int, lift: int, touch: int) -> bool:
+    """Whether the bodies of a contact are apart at some moment between two samples."""
+    link, other = folder.motion.contact_link[contact], folder.partner(contact)
+    middle = (lift + touch) * DENSITY // 2
+    # It is most likely halfway.
+    moments = sorted(range(lift * DENSITY, touch * DENSITY), key=lambda i: abs(i - middle))
+    return any(
+        body_distance(folder.object, path.at("object", i), other, path.at(link, i)) > folder.task.limits.gap
+        for i in moments
+    )
 
 
 def surface_normals(folder: Folder, placed: Placements, k: int, c: int) -> tuple[np.ndarray, np.ndarray]:
@@ -121,7 +141,7 @@ def slip_figure(folder: Folder, path: Trajectory) -> Figure:
     runs = [np.zeros(len(motion.time) - 1)]
     for c, name in enumerate(motion.contact_names):
         steps = _slip_steps(folder, path, c)
-        for first, last in active_runs(folder, c):
+        for first, last in active_runs(folder, path, c):
             slip = float(np.sum(steps[first:last]))
             words = f"contact '{name}' slips {{value}} between {motion.time[first]:.3g} s and {motion.time[last]:.3g} s"
             worst = worse(worst, (slip, words))
@@ -141,7 +161,7 @@ def spin_figure(folder: Folder, path: Trajectory) -> Figure:
         rotation, _ = path.placed["object"]
         relative = Rotation.from_matrix(rotation).inv() * Rotation.from_matrix(path.placed[motion.contact_link[c]][0])
         turns = (relative[:-1] * relative[1:].inv()).as_rotvec()
-        for first, last in active_runs(folder, c):
+        for first, last in active_runs(folder, path, c):
             inside = range(first * DENSITY, last * DENSITY)
             spun = [float(turns[i] @ folder.object.normal(_contact_point(folder, path, c, i)[0])) for i in inside]
             angle = float(np.rad2deg(np.max(np.abs(np.cumsum(spun)), initial=0.0)))

@@ -35,7 +35,7 @@ def sliding_figure(folder: Folder, placed: Placements, path: Trajectory) -> Figu
             moved[k] += step
             slipped[k] += float(np.linalg.norm(step))
         speed = np.linalg.norm(moved, axis=1) / np.diff(motion.time)
-        for first, last in active_runs(folder, c):
+        for first, last in active_runs(folder, path, c):
             if slipped[first:last].sum() <= CREEP:
                 continue
             for k in range(first, last):

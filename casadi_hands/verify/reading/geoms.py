@@ -15,7 +15,15 @@ from casadi_hands.verify.flat import Box, Convex
 from casadi_hands.verify.reading.markup import called, number, numbers, positive, strangers
 from casadi_hands.verify.shapes import Capsule, Cylinder, Shape
 
-_GEOM = "name type pos quat mesh fromto size friction condim priority solref solimp rgba"
+_COMMON = "name type friction priority rgba"
+# What says where a solid is, and how large; MuJoCo would let a mesh or two ends say it anew.
+_PLACED = {
+    "sphere": "pos size",
+    "cylinder": "pos size",
+    "box": "pos quat size",
+    "mesh": "mesh",
+    "plane": "pos size condim",
+}
 _FRICTION = "1 0.005 0.0001"
 
 
@@ -49,13 +57,14 @@ def read_geom(path: Path, meshes: Mapping[str, Convex], element: Element) -> tup
     Returns:
         What it is, and what of it the format does not have.
     """
-    strange = list(strangers(element, "", _GEOM))
     kind = element.get("type", "sphere")
+    spans = kind == "capsule" or (kind == "cylinder" and element.get("fromto") is not None)
+    strange = list(strangers(element, "", f"{_COMMON} {'fromto size' if spans else _PLACED.get(kind, '')}"))
     place = numbers(path, element, "pos", 3, "0 0 0")
     shape: Shape | None = None
     if kind == "sphere":
         shape = Capsule(place, place, positive(path, element, "size"))
-    elif kind == "capsule" or (kind == "cylinder" and element.get("fromto") is not None):
+    elif spans:
         ends = numbers(path, element, "fromto", 6)
         shape = (Capsule if kind == "capsule" else Cylinder)(ends[:3], ends[3:], positive(path, element, "size"))
     elif kind == "cylinder":
@@ -69,19 +78,11 @@ def read_geom(path: Path, meshes: Mapping[str, Convex], element: Element) -> tup
         shape = Box(sides, place, Rotation.from_quat(turn, scalar_first=True).as_matrix())
     elif kind == "mesh":
         shape = meshes.get(element.get("mesh", ""))
-        if element.get("pos") is not None:
-            strange.append(f"{called(element)} is not where its mesh is: it has a place of its own")
     elif kind != "plane":
-        strange.append(f"{called(element)} is a {kind}, which the format does not have")
-    if kind != "box" and element.get("quat") is not None:
-        strange.append(f"{called(element)} is turned, which a {kind} is not")
-    read_looks(path, element)
+        strange.append(f"{called(element)} is a {kind[:40]}, which the format does not have")
+    elif number(path, element, "condim", "4") != 3:
+        strange.append(f"{called(element)}: what touches it has friction of other than 3 dimensions (condim)")
+    if element.get("rgba") is not None:
+        numbers(path, element, "rgba", 4)
     friction = numbers(path, element, "friction", 3, _FRICTION)
     return Geom(kind, place, shape, friction, number(path, element, "priority", "0")), strange
-
-
-def read_looks(path: Path, element: Element) -> None:
-    """Read what of a solid is compared with nothing, so that it is numbers."""
-    for name, count in (("rgba", 4), ("solref", 2), ("solimp", 3), ("condim", 1)):
-        if element.get(name) is not None:
-            numbers(path, element, name, count)

@@ -9,6 +9,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from casadi_hands.verify.reading.markup import number, numbers, strangers
+from casadi_hands.verify.reading.settings import stiffness_problems
 
 _ATTRIBUTES = "name type pos axis ref frictionloss stiffness damping springref solreffriction solimpfriction"
 
@@ -38,6 +39,8 @@ def read_mount(path: Path, strange: list[str], element: Element) -> Mount:
         DesignError: a number is missing or is not finite.
     """
     strange.extend(strangers(element, "", _ATTRIBUTES))
+    if "frictionloss" in element.attrib:
+        strange.extend(stiffness_problems(path, element))
     return Mount(
         name=element.get("name", ""),
         kind=element.get("type", "hinge"),

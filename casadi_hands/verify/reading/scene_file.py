@@ -11,18 +11,16 @@ import numpy as np
 
 from casadi_hands.errors import DesignError
 from casadi_hands.verify.flat import Convex
-from casadi_hands.verify.reading.geoms import Geom, read_geom, read_looks
+from casadi_hands.verify.reading.geoms import Geom, read_geom
 from casadi_hands.verify.reading.markup import called, name_of, number, numbers, only, positive, read_xml, strangers
 from casadi_hands.verify.reading.mount import Mount, read_mount
 from casadi_hands.verify.reading.points import hull_points
+from casadi_hands.verify.reading.settings import Settings, read_settings, stiffness_problems
 
 SHORTEST_STEP = 1e-4
-"""s of the simulation; contacts that stiffen within 10 ms need no shorter ones."""
-MOST_ITERATIONS = 1000
-"""Of the engine's solver a step; MuJoCo's own default is 100."""
+"""s of the simulation; contacts that stiffen within 2 ms need no shorter ones."""
 
 _SECTIONS = "compiler option statistic default worldbody contact equality tendon actuator keyframe visual asset"
-_OPTIONS = "timestep gravity integrator cone impratio noslip_iterations iterations tolerance solver"
 _KEY = ("time", "qpos", "ctrl", "mpos", "mquat")
 
 
@@ -101,7 +99,7 @@ class Scene:
     """What ``scene.xml`` says.
 
     Attributes:
-        step: of the simulation, s.
+        settings: of the simulation.
         gravity: (3,) m/s².
         text: the file's content as it was read, comments left out.
         bodies: by name, in the file's order, which is that of MuJoCo's coordinates.
@@ -116,7 +114,7 @@ class Scene:
         strange: what the format does not have, a sentence each.
     """
 
-    step: float
+    settings: Settings
     gravity: np.ndarray
     text: str
     bodies: dict[str, SceneBody] = field(default_factory=dict)
@@ -142,20 +140,18 @@ def read_scene(path: Path) -> Scene:
     section = {tag: only(path, root, tag) for tag in _SECTIONS.split()}
     option, world = section["option"], section["worldbody"]
     option = Element("option") if option is None else option
-    for name in ("impratio", "noslip_iterations", "iterations", "tolerance"):
-        if number(path, option, name, "0") > MOST_ITERATIONS:
-            raise DesignError(f"{path}: its {name} is {option.get(name)}; at most {MOST_ITERATIONS} is allowed")
     if world is None:
         raise DesignError(f"{path}: no <worldbody>, so nothing is in the scene")
     if section["compiler"] is None or section["compiler"].get("angle") != "radian":
         raise DesignError(f"{path}: angles are not in radians")
-    step, text = number(path, option, "timestep", "0.002"), ElementTree.tostring(root, encoding="unicode")
-    if step < SHORTEST_STEP:
-        raise DesignError(f"{path}: its timestep is {step:g} s; a replay takes {SHORTEST_STEP:g} s at least")
-    scene = Scene(step, numbers(path, option, "gravity", 3, "0 0 -9.81"), text)
-    scene.strange.extend(strangers(root, _SECTIONS, "model"))
-    allowed = {"compiler": ("", "angle"), "option": ("", _OPTIONS), "default": ("geom", ""), "contact": ("exclude", "")}
-    allowed |= {"tendon": ("fixed", ""), "asset": ("mesh", "")}
+    settings, odd = read_settings(path, option, section["default"])
+    if settings.step < SHORTEST_STEP:
+        raise DesignError(f"{path}: its timestep is {settings.step:g} s; a replay takes {SHORTEST_STEP:g} s at least")
+    text = ElementTree.tostring(root, encoding="unicode")
+    scene = Scene(settings, numbers(path, option, "gravity", 3, "0 0 -9.81"), text)
+    scene.strange.extend((*strangers(root, _SECTIONS, "model"), *odd))
+    allowed = {"compiler": ("", "angle"), "default": ("geom", ""), "contact": ("exclude", "")}
+    allowed |= {"tendon": ("fixed", ""), "asset": ("mesh", ""), "statistic": ("", "extent center meansize")}
     allowed |= {"equality": ("weld joint", ""), "actuator": ("position", ""), "keyframe": ("key", "")}
     for tag, (tags, attributes) in allowed.items():
         if (element := section[tag]) is not None:
@@ -165,25 +161,26 @@ def read_scene(path: Path) -> Scene:
     if section["tendon"] is not None and not scene.springs:
         scene.strange.append("<tendon> in <mujoco> holds no spring")
     _read_body(path, scene, world, "world")
+    shapes = [geom.shape for body in scene.bodies.values() for geom in body.geoms]
+    unused = [name for name, mesh in scene.meshes.items() if not any(mesh is shape for shape in shapes)]
+    scene.strange.extend(f'<mesh name="{name[:60]}"> is of no solid' for name in unused)
     return scene
 
 
 def _read_entry(path: Path, scene: Scene, element: Element) -> None:
     """Read what stands in a section beside the bodies."""
     odd = scene.strange
-    if element.tag == "geom":
-        odd += strangers(element, "", "condim solref solimp")
-        read_looks(path, element)
-    elif element.tag == "exclude":
+    if element.tag == "exclude":
         scene.excluded.append(frozenset((element.get("body1", ""), element.get("body2", ""))))
         odd += strangers(element, "", "name body1 body2")
     elif element.tag == "weld":
         scene.welds.append((element.get("body1", ""), element.get("body2", "")))
-        odd += strangers(element, "", "body1 body2 solref")
+        odd += (*strangers(element, "", "body1 body2 solref"), *stiffness_problems(path, element))
     elif element.tag == "joint":
         pair = element.get("joint1", ""), element.get("joint2", "")
         scene.threads.append((*pair, numbers(path, element, "polycoef", 5)))
         odd += strangers(element, "", "joint1 joint2 polycoef solref solimp")
+        odd += stiffness_problems(path, element)
     elif element.tag == "position":
         joint = element.get("joint", "")
         kp, kv = positive(path, element, "kp"), number(path, element, "kv", "0")
