@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -65,6 +66,21 @@ def test_a_solve_stops_where_it_is_told_and_leaves_a_folder(stage: str, tmp_path
 def test_an_unknown_stage_is_refused() -> None:
     with pytest.raises(SolveError, match="until: given 'refined'; allowed: floating, synthesis, whole_hand, refine"):
         solve(parse_task(BALL), until="refined")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("seed", -1, "seed: given -1; allowed: an integer of at least 0"),
+        ("seed", 1.5, "seed: given 1.5; allowed: an integer"),
+        ("jobs", 0, "jobs: given 0; allowed: an integer of at least 1"),
+    ],
+)
+def test_numbers_that_cannot_be_are_refused(name: str, value: Any, words: str, tmp_path: Path) -> None:
+    """A seed of -1 left a folder that nothing could read."""
+    with pytest.raises(SolveError, match=words):
+        solve(parse_task(BALL), out=tmp_path / "out", **{name: value})
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.fixture(scope="module")

@@ -211,7 +211,7 @@ def audit(
             "reasons": found.reasons,
             "notes": list(found.notes),
         }
-        print(json.dumps(record, indent=1, ensure_ascii=False))
+        print(json.dumps(record, indent=1, ensure_ascii=False, allow_nan=False))
     else:
         Console().print(audit_summary(found))
     raise typer.Exit(0 if found.certified else 1)

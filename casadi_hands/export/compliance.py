@@ -75,13 +75,13 @@ def link_eases(hand: Hand, motion: Motion, motors: Sequence[Motor], moves: bool)
         joint = model.joints[model.getJointId(name)]
         angles[joint.idx_q], rotors[joint.idx_v] = angle, motor.armature
     model.armature = rotors
-    inertia = pin.crba(model, data, angles)
-    inertia = np.triu(inertia) + np.triu(inertia, 1).T
+    upper = np.triu(np.reshape(pin.crba(model, data, angles), (model.nv, model.nv)))
+    inertia = upper + np.triu(upper, 1).T
     pin.computeJointJacobians(model, data, angles)
     eases = {}
     for name in hand.joint_names:
         joint = model.getJointId(name)
-        slope = pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.LOCAL)
+        slope = np.reshape(pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.LOCAL), (6, model.nv))
         moved = slope[:3] - pin.skew(model.inertias[joint].lever) @ slope[3:]
         eases[name.replace("_joint", "_link")] = float(np.trace(moved @ np.linalg.solve(inertia, moved.T))) / 3
     return eases

@@ -85,7 +85,8 @@ def solve(
         failed at once.
 
     Raises:
-        SolveError: ``until`` is not a stage, or not the last where there is a start; or the start is of a task of
+        SolveError: ``until`` is not a stage, or not the last where there is a start; or ``seed`` or ``jobs`` is no such
+            number; or the start is of a task of
             another structure; or one of ``terms`` cannot be used; or there is nothing to resume; or processes that ran
             a trial were lost with it.
         DesignError: there is no result in ``start``; or ``out`` cannot be written, is written by another process, or
@@ -101,6 +102,9 @@ def solve(
         raise SolveError(
             "only a solve that writes a folder (out), without terms of its own, can be resumed; leave resume out"
         )
+    for name, value, least in (("seed", seed, 0), ("jobs", jobs, 1)):
+        if value is not None and not (isinstance(value, int) and value >= least):
+            raise SolveError(f"{name}: given {value!r}; allowed: an integer of at least {least}")
     if seed is not None:
         task = task.model_copy(update={"search": task.search.model_copy(update={"seed": seed})})
     own_terms = checked(terms)

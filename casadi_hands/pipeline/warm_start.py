@@ -136,7 +136,7 @@ def _check_structure(earlier: Design, hand: Hand, task: Task) -> None:
 def _other_regrasps(before: Task, after: Task, name: str) -> str:
     """Say that a finger lets go at other times than it did, moved as the goals have; empty where it does not."""
     was, now = (np.ravel([each.times for each in task.fingers[name].regrasps or ()]) for task in (before, after))
-    there, here = ([goal.at for goal in task.motion] for task in (before, after))
+    there, here = ([*(goal.at for goal in task.motion), task.duration] for task in (before, after))
     was = np.interp(was, there, here)
     if len(was) == len(now) and np.all(np.abs(was - now) < after.time_step):
         return ""

@@ -6,13 +6,14 @@ physics integrated anew (see ``dynamics``), the motion between samples rebuilt f
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from casadi_hands.task import load_task
-from casadi_hands.verify.checks.certificate import certificate_problems
+from casadi_hands.verify.checks.certificate import PLAYED, certificate_problems, replay_problems
 from casadi_hands.verify.checks.structure import structure_problems
 from casadi_hands.verify.checks.trust import limit_notes
 from casadi_hands.verify.figures.attached import attachment_figures, joint_residual, object_shots
@@ -56,16 +57,24 @@ def audit(directory: str | Path, *, task: str | Path | None = None, replays: int
         TaskError: ``task.yaml`` is not a task.
         HandsError: MuJoCo cannot be loaded.
     """
-    found = _with_certificate(directory, audit_files(directory, task), task is None)
+    own, found = task is None, audit_files(directory, task)
+    figures = {name: figure for name, figure in found.figures.items() if name != "structure"}
+    found = _with_problems(found, certificate_problems(directory, figures, own))
     if not replays or not found.certified:
         return found
-    figures = run_replays(directory, replays, jobs=jobs).figures(None if task is None else load_task(task))
-    return replace(found, figures={**found.figures, **{figure.name: figure for figure in figures}})
+    played = run_replays(directory, replays, jobs=jobs)
+    figures = {figure.name: figure for figure in played.figures(None if task is None else load_task(task))}
+    # How many drop the object depends on how many are played.
+    stated = {name: figure for name, figure in figures.items() if name != "replay_dropped" or replays == TOGETHER}
+    wrong = [
+        *certificate_problems(directory, stated, own, PLAYED),
+        *(replay_problems(directory, played) if own else ()),
+    ]
+    return _with_problems(replace(found, figures={**found.figures, **figures}), wrong)
 
 
-def _with_certificate(directory: str | Path, found: Audit, limits: bool) -> Audit:
-    """Return the audit with what is wrong with the certificate that ``result.json`` states."""
-    wrong = certificate_problems(directory, {n: f for n, f in found.figures.items() if n != "structure"}, limits)
+def _with_problems(found: Audit, wrong: Sequence[str]) -> Audit:
+    """Return the audit with what else is wrong with the files."""
     if not wrong:
         return found
     problems = (*found.problems, *wrong)

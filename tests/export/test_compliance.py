@@ -8,6 +8,7 @@ import pytest
 
 from casadi_hands.export.compliance import contact_time, link_eases
 from casadi_hands.export.mjcf import scene_mjcf
+from casadi_hands.problem.inertia import body_inertials
 from casadi_hands.problem.motors import joint_motors
 from casadi_hands.task import parse_task
 from tests.export.example import TASK, example_hand, example_motion, example_task
@@ -61,6 +62,22 @@ def test_a_pressed_fingertip_gives_by_hertz(force):
     hertz = np.cbrt(9 * force**2 / (16 * modulus**2 * tip.radius))
     # Deeper contacts are stiffer than barely touching ones, for which the time is set.
     assert 0.6 * hertz < tip.radius - data.qpos[2] < 1.05 * hertz
+
+
+def test_a_hand_of_one_joint_has_a_link_that_is_moved():
+    """One column is one number a row to Pinocchio."""
+    whole = example_hand()
+    hand = replace(whole, fingers=(replace(whole.fingers[0], links=whole.fingers[0].links[:1]),))
+    motion = example_motion()
+    motion = replace(motion, joint_names=motion.joint_names[:1], joint_angles=motion.joint_angles[:, :1])
+    motors = joint_motors(example_task(), hand)
+    eases = link_eases(hand, motion, motors, False)
+    assert list(eases) == ["finger0_link0"]
+    link = hand.fingers[0].links[0]
+    (body,) = (each for name, each in body_inertials(hand).items() if name == "finger0_link0")
+    lever = np.cross(link.axis, body.center)
+    about = link.axis @ body.inertia @ link.axis + body.mass * lever @ lever + motors[0].armature
+    assert eases["finger0_link0"] == pytest.approx(lever @ lever / about / 3, rel=1e-9)
 
 
 def test_forces_of_other_bodies_and_of_none_count_for_nothing():

@@ -330,6 +330,13 @@ def test_fingers_may_let_go_where_goals_have_moved_to() -> None:
         assert _other_regrasps(before, after, "index") == words
 
 
+def test_fingers_may_let_go_after_the_last_goal() -> None:
+    index = "  index: {touches: [0, -0.02, 0.02]} -> "
+    longer = "name: move -> duration: 4\nname: move"
+    task = parse_task(edited(index + LIFTS.format(2.4, 3.2), longer))
+    assert _other_regrasps(task, task, "index") == ""
+
+
 def test_drawings_and_poses_are_no_start_for_each_other() -> None:
     drawing = edited("tool: [0, 0, -0.06]")
     for at, x in ((0, "0.075"), (1, "0.115"), (2, "0.075")):

@@ -187,6 +187,8 @@ def test_what_the_grasp_has_left_along_a_joint_is_to_the_nearer_end() -> None:
     assert least_margin(np.array([-2.0, 1.0, 3.0]), -1.5) == 0.5
     assert least_margin(np.array([1.0, 3.0]), 0.25) == 0.25
     assert least_margin(np.array([1.0, 3.0]), 4.0) == 0.0
+    # Its figure goes into JSON, which knows no numbers of NumPy.
+    assert type(least_margin(np.array([1.0, 3.0]), np.float64(0.25))) is float
 
 
 def test_a_replay_starts_off_its_place_only_as_far_as_the_joint_lets_it(tmp_path: Path) -> None:

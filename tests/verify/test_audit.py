@@ -12,7 +12,8 @@ import pytest
 
 from casadi_hands.errors import DesignError
 from casadi_hands.task import task_to_yaml
-from casadi_hands.verify import audit
+from casadi_hands.verify import audit, run_replays
+from casadi_hands.verify.report import Audit
 from tests.verify.fixture import SPHERE, Scene, carried, object_urdf, plain, read_task
 
 
@@ -38,6 +39,32 @@ def test_certificate_is_json(good: Scene, tmp_path: Path) -> None:
     # Of hands whose joints share motors, and of objects on joints.
     assert limits.keys() - certificate.keys() == {"coupling", "attachment_shortfall"}
     assert all(entry["holds"] for entry in certificate.values())
+
+
+def test_replays_that_are_stated_are_those_that_are_played(good: Scene, tmp_path: Path) -> None:
+    played = run_replays(good.write(tmp_path / "played"))
+    figures = {figure.name: figure for figure in played.figures()}
+    record, certificate = played.record(), Audit("", figures, ()).as_certificate()
+    stated = replace(good, changes={"replays": [record], "certificate": certificate})
+    assert audit(stated.write(tmp_path / "stated")).reasons == []
+    goals = [{"mm": 0.0, "degrees": 0.0}, *record["goals"][1:]]
+    goals[-1] = {"mm": 99.0, "degrees": record["goals"][-1]["degrees"]}
+    falsified = {**record, "dropped_as_planned": True, "dropped": 20, "goals": goals}
+    certificate["replay_position"] = {**certificate["replay_position"], "value": 0.05, "limit": 1.0}
+    certificate["replay_angle"] = {**certificate["replay_angle"], "value": None}
+    certificate["replay_dropped"] = {**certificate["replay_dropped"], "unit": "m"}
+    stated = replace(good, changes={"replays": [falsified], "certificate": certificate})
+    reasons = "\n".join(audit(stated.write(tmp_path / "falsified")).reasons)
+    for words in (
+        "certificate: result.json says replay_position is 50 mm, the files give",
+        "certificate: the limit of replay_position in result.json is not the task's",
+        "certificate: result.json states no number for replay_angle",
+        "certificate: result.json has replay_dropped in other units than the task",
+        "replays: result.json says otherwise, but the hand holds the object as planned",
+        f"replays: result.json says 20 of {record['of']} drop the object, {record['dropped']} do",
+        f"replays: result.json says 99 mm off goal {len(goals)}, it is ",
+    ):
+        assert words in reasons, reasons
 
 
 def _force_scaled(scene: Scene) -> Scene:

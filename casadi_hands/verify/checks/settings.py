@@ -98,13 +98,14 @@ def _eases(folder: Folder, moves: bool) -> dict[str, float]:
     for name, angle in zip(folder.motion.joint_names, folder.motion.joint_angles[0], strict=True):
         joint = model.joints[model.getJointId(name)]
         angles[joint.idx_q], motors[joint.idx_v] = angle, rotor(folder)
-    upper = np.triu(pin.crba(model, data, angles))
+    upper = np.triu(np.reshape(pin.crba(model, data, angles), (model.nv, model.nv)))
     inverse = np.linalg.inv(upper + np.triu(upper, 1).T + np.diag(motors))
     pin.computeJointJacobians(model, data, angles)
     eases = {}
     for name, joint in folder.joints.items():
         number = model.getJointId(name)
         center = pin.SE3(np.eye(3), model.inertias[number].lever)
-        moved = (center.toActionMatrixInverse() @ pin.getJointJacobian(model, data, number, pin.LOCAL))[:3]
+        slope = np.reshape(pin.getJointJacobian(model, data, number, pin.LOCAL), (6, model.nv))
+        moved = (center.toActionMatrixInverse() @ slope)[:3]
         eases[joint.child] = float(np.trace(moved @ inverse @ moved.T)) / 3
     return eases

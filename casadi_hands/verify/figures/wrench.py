@@ -138,7 +138,7 @@ def disturbance_figure(folder: Folder, placed: Placements) -> Figure:
 def least_margin(edges: np.ndarray, exerted: float) -> float:
     """Return how much more, either way, of ``edges`` (N,) along a joint there could be than what is exerted."""
     most, least = float(edges.max(initial=0.0)), float(edges.min(initial=0.0))
-    return max(min(most - exerted, exerted - least), 0.0)
+    return float(max(min(most - exerted, exerted - least), 0.0))
 
 
 def disturbance_radius(edges: np.ndarray, exerted: np.ndarray) -> float:
