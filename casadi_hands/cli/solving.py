@@ -6,6 +6,7 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -158,6 +159,15 @@ def _as_stopped(asked: Asked, folder: Path) -> tuple[Task, Path, tuple[int, ...]
     return problem, folder, request.seeds, replace(asked, until=request.until, start=start, force=force)
 
 
+def _so_far(folder: Path) -> str:
+    """How good the result is that a folder has, where that can be told."""
+    with suppress(Exception):  # last words are said whatever is there
+        from casadi_hands.export.folder import read_design
+
+        return f", which is {read_design(folder)['status']}"
+    return ""
+
+
 def _stopped(reporter: Reporter | Events, folder: Path, explores: bool) -> None:
     """Last words before the program ends at once."""
     reporter.stop()
@@ -170,7 +180,9 @@ def _stopped(reporter: Reporter | Events, folder: Path, explores: bool) -> None:
         leave_unfinished()
         goes_on = is_unfinished(folder)
     if own:
-        words = f"what was computed is in {folder}"
+        words = f"what was computed is in {folder}{_so_far(folder)}"
     else:
         words = f"the result in {folder} is an earlier one" if complete else "no stage was complete"
-    reporter.note(f"stopped; {words}{f'; go on with: casadi-hands solve --resume {folder}' if goes_on else ''}")
+    reporter.note(
+        f"stopped; {words}{f'; go on with: casadi-hands solve --resume {quote(str(folder))}' if goes_on else ''}"
+    )

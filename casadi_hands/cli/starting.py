@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from shlex import quote
 from typing import Annotated, Any
 
 import typer
@@ -66,7 +67,7 @@ def new(
     write_new(file, starter(idea))
     text, possible = check_summary(*load_questioned(file))
     Console().print(text)
-    print(f"\nwritten: {file}\nnext: casadi-hands solve {file}")
+    print(f"\nwritten: {file}\nnext: casadi-hands solve {quote(str(file))}")
     raise typer.Exit(0 if possible else 1)
 
 
@@ -96,7 +97,7 @@ def examples(
     if name is None:
         return
     path = shipped.copy_example(name, out)
-    print(f"written: {path}\nnext: casadi-hands solve {path}")
+    print(f"written: {path}\nnext: casadi-hands solve {quote(str(path))}")
 
 
 def fields() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
@@ -87,6 +88,7 @@ def _lines(task: Task, force_limit: float) -> Iterator[tuple[str, str]]:
     most = f"{force_limit:g} weights ({force_limit * task.force_unit:.3g} N)"
     yield "", f"contact forces of at most {most} along each axis of the object"
     yield "links", _links(task)
+    yield "", _joints(task)
     for i, goal in enumerate(task.motion):
         yield "" if i else "goals", f"{goal.at:g} s: {_goal(goal)}"
     samples = f"samples at most {task.time_step:g} s apart"
@@ -104,7 +106,8 @@ def _lines(task: Task, force_limit: float) -> Iterator[tuple[str, str]]:
         ),
     )
     usual = Task.model_validate(task.model_dump(by_alias=True, exclude_none=True, exclude={"limits"})).limits
-    changed = {name: value for name, value in task.limits if value != getattr(usual, name)}
+    # Lengths of the object differ in the last digit where its points have been moved to its centre of mass.
+    changed = {name: value for name, value in task.limits if not math.isclose(value, getattr(usual, name))}
     if changed:
         yield (
             "limits",
@@ -165,11 +168,27 @@ def _links(task: Task) -> str:
     motors = f"motors of {motor.stiffness:g} N·m/rad, {'at most ' + ' and '.join(most) if most else 'without limits'}"
     if hand.drive.servo:
         motors = f"servos {hand.drive.servo}, {motors}"
+    if task.motors != "independent":
+        shared = "as few as will do" if task.motors == "fewest" else f"at most {task.motors} for all joints"
+        motors = f"{motors}, {shared}"
     thick = f"radius {1e3 * hand.link_radius:.4g} mm"
     if task.fingertip.radius > hand.link_radius:
         thick += f", of the last {1e3 * task.fingertip.radius:.4g} mm"
     sizes = f"{thick}, {low:.4g} to {high:.4g} mm long"
     return f"{sizes}; joints {lower:g} to {upper:g} deg; {motors}"
+
+
+def _joints(task: Task) -> str:
+    """What joints and links may be like, and how fingertips resist a twist."""
+    hand, tip = task.hand, task.fingertip
+    least, largest = hand.axes.from_link
+    tips = (
+        f"fingertips resist a twist by {1e3 * tip.torsion:.3g} mm times their force"
+        if tip.torsion
+        else "hard fingertips"
+    )
+    axes = f"axes {least:g} to {largest:g} deg from their links, links bent by at most {hand.bend:g} deg"
+    return f"{axes}; of {hand.density:g} kg/m³, {1e-6 * hand.material.strength:g} MPa; {tips}"
 
 
 def _goal(goal: Goal) -> str:

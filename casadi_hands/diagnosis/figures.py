@@ -95,7 +95,7 @@ def speed_reason(model: Model, design: Result) -> Reason | None:
 
 GRASP_ADVICE = "more friction, more fingers, or contacts that surround the object better (fingers: auto finds some)"
 _ADVICE = {
-    "structure": "solving the task again",
+    "structure": "a smaller time_step or another seed (--seed), and report it: the program should write no such files",
     "goal_position": "goals within reach, or limits.goal_position as wide as you can accept",
     "goal_angle": "a smaller turn between goals, or limits.goal_angle as wide as you can accept",
     "rest": "more fingers: a finger can only push, and the object must start and end at rest",

@@ -21,14 +21,16 @@ class Section(BaseModel):
         return [field.alias or name for name, field in cls.model_fields.items()]
 
 
-def refuse(allowed: str) -> PydanticCustomError:
+def refuse(allowed: str, given: str | None = None) -> PydanticCustomError:
     """Build the error of a value that a validator refuses.
 
     Args:
         allowed: what the field accepts, in the user's words.
+        given: what the file holds, where that is more than its kind tells.
     """
     # The text travels as context: a custom error's message is a template, and braces in `allowed` must survive.
-    return PydanticCustomError("refused", "{allowed}", {"allowed": allowed})
+    context = {"allowed": allowed} if given is None else {"allowed": allowed, "given": given}
+    return PydanticCustomError("refused", "{allowed}", context)
 
 
 def _of_length(count: int) -> Callable[[Any], Any]:

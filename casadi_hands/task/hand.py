@@ -80,6 +80,12 @@ class FingerSpec(Section):
         default=None, description="The region that was asked for, where the program placed the contact."
     )
 
+    @model_validator(mode="after")
+    def _optional_where_placed(self) -> FingerSpec:
+        if self.optional and self.is_placed and self.placed is None:
+            raise refuse("`optional` beside a region or `anywhere`: a finger whose point is given is always built")
+        return self
+
     @property
     def is_placed(self) -> bool:
         """Whether there is a point to touch."""

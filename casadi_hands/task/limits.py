@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from pydantic import Field
 
 from casadi_hands.task.fields import NonNegative, Section
@@ -103,4 +105,6 @@ class Limits(Section):
         json_schema_extra={"default": "the larger of 2 mm and 5 % of the characteristic length"},
     )
     replay_angle: NonNegative = Field(default=5.0, description="Angle between object and any goal then, degrees.")
-    replay_dropped: NonNegative = Field(default=0.05, description="Share of perturbed replays that drop the object.")
+    replay_dropped: Annotated[NonNegative, Field(le=1)] = Field(
+        default=0.05, description="Share of perturbed replays that drop the object."
+    )

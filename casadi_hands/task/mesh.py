@@ -8,12 +8,11 @@ from typing import Annotated, Self
 
 import numpy as np
 from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
-from pydantic_core import PydanticCustomError
 
 from casadi_hands.errors import MeshError
 from casadi_hands.geometry.hull import mass_moments
 from casadi_hands.meshes import Decomposition, convex_parts, mend, read_mesh, scaled, told
-from casadi_hands.task.fields import NonNegative, Positive, Section, Whole
+from casadi_hands.task.fields import NonNegative, Positive, Section, Whole, refuse
 from casadi_hands.task.raw_mesh import FOLDER, WITHIN, RawMesh, place, raw_path, read_raw
 
 __all__ = ["FOLDER", "WITHIN", "Mesh", "MeshRecord", "Uniform"]
@@ -66,9 +65,7 @@ class Mesh(Section):
             mesh, self._notes = mend(scaled(read_mesh(place(self.file, info.context or {})), self.scale))
             self._found = convex_parts(mesh, self.parts)
         except MeshError as error:
-            raise PydanticCustomError(
-                "refused", "{allowed}", {"allowed": error.allowed, "given": error.given}
-            ) from None
+            raise refuse(error.allowed, error.given) from None
         self._raw = RawMesh(mesh.vertices, mesh.faces)
         self._solid = Uniform(*mass_moments(mesh.corners))
         return self
@@ -126,9 +123,7 @@ class MeshRecord(Section):
             try:
                 self._raw = read_raw(self.raw, info.context or {})
             except MeshError as error:
-                raise PydanticCustomError(
-                    "refused", "{allowed}", {"allowed": error.allowed, "given": error.given}
-                ) from None
+                raise refuse(error.allowed, error.given) from None
         return self
 
     @property

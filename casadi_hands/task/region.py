@@ -16,6 +16,7 @@ from pydantic import (
 )
 
 from casadi_hands.task.fields import Positive, Section, Vector, refuse
+from casadi_hands.task.shown import escaped
 
 FEWEST, MOST = 2, 5
 """Fingers that `auto` stands for."""
@@ -90,14 +91,17 @@ Asked = Annotated[Region, BeforeValidator(_spelled_out)]
 
 def counted_fingers(value: Any) -> Any:
     """Fingers by name where a file gives their number, ``auto`` or ``{count: [least, most]}``; else what it gives."""
+    given = None
     if value == "auto":
         value = [FEWEST, MOST]
     elif isinstance(value, dict) and set(value) == {"count"} and not isinstance(value["count"], dict):
         value = value["count"]
+        given = f"a count of {escaped(str(value))}"
     elif isinstance(value, dict):
         return value
     least, most = value if isinstance(value, list | tuple) and len(value) == 2 else (value, value)
     if not (type(least) is int and type(most) is int and 1 <= least <= most <= MOST_COUNTED):
         names = "a mapping of names, such as thumb: {touches: [0, 0.02, 0]}"
-        raise refuse(f"{names}; or their number, 1 to {MOST_COUNTED}, {{count: [least, most]}}, or auto")
+        counted = f"their number, 1 to {MOST_COUNTED}, {{count: [least, most]}} of such with least <= most, or auto"
+        raise refuse(f"{names}; or {counted}", given)
     return {f"finger{i + 1}": {"touches": {}, **({"optional": True} if i >= least else {})} for i in range(most)}

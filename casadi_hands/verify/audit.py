@@ -15,7 +15,7 @@ import numpy as np
 from casadi_hands.task import load_task
 from casadi_hands.verify.checks.certificate import PLAYED, certificate_problems, replay_problems
 from casadi_hands.verify.checks.structure import structure_problems
-from casadi_hands.verify.checks.trust import limit_notes
+from casadi_hands.verify.checks.trust import limit_notes, unread_notes
 from casadi_hands.verify.figures.attached import attachment_figures, joint_residual, object_shots
 from casadi_hands.verify.figures.clearance import joint_figure, penetration_figure, speed_figure
 from casadi_hands.verify.figures.contact import (
@@ -123,7 +123,8 @@ def audit_files(directory: str | Path, task: str | Path | None = None) -> Audit:
         *stability_figures(folder),
         *structure_figures(folder, placed),
     ]
-    return Audit(folder.task.name, {figure.name: figure for figure in figures}, tuple(problems), limit_notes(folder))
+    notes = (*limit_notes(folder), *unread_notes(folder))
+    return Audit(folder.task.name, {figure.name: figure for figure in figures}, tuple(problems), notes)
 
 
 def residual_figures(folder: Folder, shots: Shots) -> list[Figure]:

@@ -13,13 +13,15 @@ arrives at the next follow from the distance between the two and from these forc
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.verify.reading.folder import Folder
-from casadi_hands.verify.reading.stored import entry
+from casadi_hands.verify.reading.stored import as_array, brief, entry
+from casadi_hands.verify.report import show
 
 _POINTS, _WEIGHTS = leggauss(8)
 SHARES, WEIGHTS = (_POINTS + 1) / 2, _WEIGHTS / 2
@@ -123,16 +125,43 @@ def course(folder: Folder, joint: Held) -> Course:
     return Course(position, velocity, friction)
 
 
+def _stated_problems(folder: Folder, joint: Held, stated: Any) -> list[str]:
+    """Where the joint of ``result.json`` is not the task's."""
+    attached = folder.task.object.attached
+    assert attached is not None
+    if entry(stated, "joint") != attached.kind:
+        return [f"attached: result.json says {brief(entry(stated, 'joint'))}, task.yaml says {attached.kind}"]
+    back = joint.rotation.inv()
+    due: dict[str, Any] = {
+        "axis": back.apply(joint.axis),
+        "friction": joint.friction,
+        "stiffness": joint.stiffness,
+        "damping": joint.damping,
+    }
+    if joint.turns:
+        due |= {"point": back.apply(joint.pivot - joint.position), "advance": joint.advance}
+    return [
+        f"attached: {name} is {brief(entry(stated, name))} in result.json, which is not the task's"
+        for name, value in due.items()
+        if not _agrees(entry(stated, name), np.asarray(value), 1e-6 * max(folder.length, float(np.abs(value).max())))
+    ]
+
+
+def _agrees(stated: Any, due: np.ndarray, close: float) -> bool:
+    found = as_array(stated, due.shape)
+    return found is not None and bool(np.all(np.abs(found - due) <= close))
+
+
 def joint_problems(folder: Folder) -> list[str]:
     """Return where the object is not on its joint, or the file does not say how it goes along it, a sentence each."""
     joint, motion = held(folder), folder.motion
     names = ("attachment_position", "attachment_velocity", "attachment_friction")
     given = [name for name in names if getattr(motion, name) is not None]
+    stated = entry(folder.result, "attached")
     if joint is None:
-        return [f"{name}: in motion.npz, though the object is attached to nothing" for name in given]
-    kind = folder.task.object.attached.kind  # type: ignore[union-attr]
-    stated = entry(folder.result, "attached", "joint")
-    problems = [] if stated == kind else [f"attached: result.json says {stated or 'none'}, task.yaml says {kind}"]
+        problems = [] if stated is None else ["attached: result.json has a joint, task.yaml has none"]
+        return problems + [f"{name}: in motion.npz, though the object is attached to nothing" for name in given]
+    problems = _stated_problems(folder, joint, stated)
     problems += [f"{name}: missing, though a joint holds the object" for name in names if name not in given]
     due, turn = joint.place(course(folder, joint).position)
     off = np.linalg.norm(motion.object_position - due, axis=1) / folder.length
@@ -140,7 +169,7 @@ def joint_problems(folder: Folder) -> list[str]:
     k = int(np.argmax(off + angle))
     if not off[k] + angle[k] <= 1e-6:
         problems.append(
-            f"object_position: at {motion.time[k]:.3g} s the object is {off[k] * folder.length:.3g} m and "
-            f"{np.degrees(angle[k]):.3g}° off the joint that holds it"
+            f"object_position: at {motion.time[k]:.3g} s the object is {show(off[k] * folder.length, 'm')} and "
+            f"{np.degrees(angle[k]):.2g}° off the joint that holds it"
         )
     return problems

@@ -150,6 +150,18 @@ def test_check_says_how_hard_contacts_may_press() -> None:
     assert f"contact forces of at most 20 weights ({20 * weight:.3g} N) along each axis of the object" in text
 
 
+@pytest.mark.parametrize(("motors", "words"), [("fewest", "as few as will do"), ("2", "at most 2 for all joints")])
+def test_check_says_what_hands_may_be_like(motors: str, words: str, tmp_path: Path) -> None:
+    path, text = tmp_path / "pill.yaml", (PROBLEMS / "pill_turn.yaml").read_text(encoding="utf-8")
+    path.write_text(f"{text}\nmotors: {motors}\nhand: {{bend: 30, axes: {{from_link: [70, 85]}}}}\n", encoding="utf-8")
+    said = " ".join(run("check", path).output.split())
+    assert f"motors of 1 N·m/rad, without limits, {words} axes 70 to 85 deg from their links, links bent by" in said
+    assert "by at most 30 deg; of 1240 kg/m³, 26 MPa; fingertips resist a twist by 0.637 mm times their force" in said
+    # Points are moved to the centre of mass, by which lengths differ in their last digit.
+    handle = PROBLEMS.parent / "examples" / "everyday" / "door_handle.yaml"
+    assert "changed from their defaults" not in " ".join(run("check", handle).output.split())
+
+
 @pytest.mark.parametrize("command", [("check",), ("solve", "--jobs", "1", "--out", "out")])
 def test_what_no_hand_can_do_is_told_at_once_and_exits_1(
     command: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -365,7 +377,7 @@ main()
     [
         (False, False, "no stage was complete"),
         (True, False, "the result in {out} is an earlier one"),
-        (True, True, "what was computed is in {out}"),
+        (True, True, "what was computed is in {out}, which is feasible"),
     ],
 )
 def test_interrupt_ends_a_solve_in_the_midst_of_ipopt(
@@ -409,6 +421,21 @@ def test_audit_holds_or_names_what_does_not(scene: Scene, tmp_path: Path) -> Non
     rows = [line.split() for line in bad.output.splitlines()]
     assert any(row[:1] == ["residual"] and row[-1] == "missed" for row in rows)
     assert "that nothing exerts moves the object" in " ".join(bad.output.split())
+
+
+def test_an_audit_without_replays_says_so(scene: Scene, tmp_path: Path) -> None:
+    good = scene.write(tmp_path / "good")
+    (good / "viewer.html").write_text("<h1>certified</h1>", encoding="utf-8")
+    files = run("audit", good, "--replays", 0)
+    assert files.exit_code == 0
+    assert files.output.splitlines()[0].endswith(": the files hold; not replayed")
+    assert "note: not looked at: viewer.html" in " ".join(files.output.split())
+    assert run("audit", good).output.splitlines()[0].endswith(": certified")
+
+
+def test_the_module_is_the_command() -> None:
+    said = subprocess.run([sys.executable, "-m", "casadi_hands", "--help"], capture_output=True, text=True, check=True)
+    assert "solve" in said.stdout
 
 
 def test_audit_as_json(scene: Scene, tmp_path: Path) -> None:

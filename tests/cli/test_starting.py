@@ -126,6 +126,12 @@ def test_an_example_is_copied_with_all_that_it_needs(
     assert (first, rest) == (schema_line(), original.read_text(encoding="utf-8"))
 
 
+def test_commands_that_are_printed_can_be_typed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    said = run("examples", "pencil_pick_up", "--out", "my pencil.yaml").output
+    assert said == "written: my pencil.yaml\nnext: casadi-hands solve 'my pencil.yaml'\n"
+
+
 def test_an_example_that_is_none(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     said = error_of(["examples", "pensil"], monkeypatch, capsys)
     assert said.startswith("casadi-hands: given pensil; allowed: battery, can, circle, ")

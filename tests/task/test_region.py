@@ -13,7 +13,7 @@ from tests.task.test_refusals import FINGERS, GOOD, message
 NAMED = GOOD.replace("radius: 0.02}", "radius: 0.02, name: bar}")
 WHOLE = (
     "a mapping of names, such as thumb: {touches: [0, 0.02, 0]}; "
-    "or their number, 1 to 8, {count: [least, most]}, or auto"
+    "or their number, 1 to 8, {count: [least, most]} of such with least <= most, or auto"
 )
 
 
@@ -73,7 +73,7 @@ REFUSED = {
     "a flag": ("fingers: true", f"14: fingers: given true; allowed: {WHOLE}"),
     "too many": ("fingers: 9", f"14: fingers: given 9; allowed: {WHOLE}"),
     "a word": ("fingers: many", f"14: fingers: given 'many'; allowed: {WHOLE}"),
-    "the wrong way round": ("fingers: {count: [5, 2]}", f"14: fingers: given a mapping of count; allowed: {WHOLE}"),
+    "the wrong way round": ("fingers: {count: [5, 2]}", f"14: fingers: given a count of [5, 2]; allowed: {WHOLE}"),
     "one against gravity": (
         "fingers: 1",
         "14: fingers: given one finger; allowed: two or more; a single contact cannot hold an object against gravity",
@@ -128,3 +128,11 @@ def test_shapes_without_names_are_named_first() -> None:
 def test_optional_is_a_flag() -> None:
     told = message(GOOD.replace("{touches: [0, 0.02, -0.01]}", "{touches: [0, 0.02, -0.01], optional: 3}"))
     assert told == "wrong.yaml:15: fingers.thumb.optional: given 3; allowed: true or false"
+
+
+def test_a_finger_whose_point_is_given_is_not_optional() -> None:
+    told = message(GOOD.replace("{touches: [0, 0.02, -0.01]}", "{touches: [0, 0.02, -0.01], optional: true}"))
+    assert told.startswith("wrong.yaml:15: fingers.thumb: ")
+    assert told.endswith(
+        "allowed: `optional` beside a region or `anywhere`: a finger whose point is given is always built"
+    )

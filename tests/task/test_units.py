@@ -88,11 +88,48 @@ def test_a_palm_far_from_its_object() -> None:
         ),
         ("hand: {joint_limits: [-1.57, 1.57]}", "hand.joint_limits: joints turn by 3.14°; are these radians?"),
         ("gravity: [0, 0, -9810]", "gravity: gravity of 9810 m/s²; is it in mm/s² or cm/s²?"),
+        (
+            "hand: {axes: {from_link: [1.0, 1.57]}}",
+            "hand.axes.from_link: axes are within 1.57° of their links; are these",
+        ),
+        ("hand: {bend: 1.5708}", "hand.bend: a bend of 1.5708° is 90° in radians; is it in radians?"),
+        ("hand: {density: 1.2}", "hand.density: links of 1.2 kg/m³ are lighter than foam; is it in g/cm³?"),
+        ("actuator: {torque: 40}", "actuator.torque: 40 N·m, where the object weighs on the hand with 0."),
+        ("fingertip: {torsion: 0.5}", "fingertip.torsion: 0.5 m is more than a tip of 5.9 mm radius can have"),
+        ("limits: {slip: 5}", "limits.slip: this is 5 m, for an object 0.044 m long; is the file in millimetres"),
+        ("limits: {goal_angle: 400}", "limits.goal_angle: no object is more than 180° from a goal, so 400° is always"),
         ("gravity: [0, 0, 9.81]", "gravity: gravity points up, and world z is up; is its sign wrong?"),
     ],
 )
 def test_single_fields_in_other_units(more: str, text: str) -> None:
     assert f": {text}" in asked(ball(more=more))
+
+
+@pytest.mark.parametrize(
+    ("moment", "words"), [(100, "more than that of all its mass"), (1e-9, "less than a hundredth")]
+)
+def test_inertia_of_no_body_of_this_size(moment: float, words: str) -> None:
+    diagonal = f"[[{moment}, 0, 0], [0, {moment}, 0], [0, 0, {moment}]]"
+    text = asked(ball().replace("mass: 0.06,", f"mass: 0.06, inertia: {diagonal},"))
+    assert f"object.inertia: {moment:.3g} kg·m² is {words}" in text
+    fine = "[[1.2e-5, 0, 0], [0, 1.2e-5, 0], [0, 0, 1.2e-5]]"
+    assert asked(ball().replace("mass: 0.06,", f"mass: 0.06, inertia: {fine},")) == ""
+
+
+def test_of_what_follows_from_a_field_nothing_is_asked() -> None:
+    """The radius of fingertips and the length of links are taken from the links' radius."""
+    assert asked(ball(more="hand: {link_radius: 8}")).count("is the file in") == 1
+
+
+def test_a_pitch_in_millimetres_and_an_angle_in_radians_of_what_hangs_on_the_world() -> None:
+    screw = "attached: {screw: {point: [0, 0, 0], axis: [0, 0, 1], pitch: 5}}"
+    text = (
+        ball()
+        .replace("radius: 0.022}}]}", f"radius: 0.022}}}}], {screw}}}", 1)
+        .replace("position: [0, 0, 0.19]", "angle: 1.5708")
+    )
+    assert "object.attached.screw.pitch: this is 5 m, for an object 0.044 m long" in asked(text)
+    assert "motion[1].angle: a turn of 1.5708° is 90° in radians" in asked(text)
 
 
 @pytest.mark.parametrize(("degrees", "means"), [("1.5708", 90), ("-0.7854", 45), ("3.14159", 180), ("6.283", 360)])

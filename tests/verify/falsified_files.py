@@ -10,6 +10,7 @@ from tests.verify.falsify import (
     arrays,
     attribute,
     both,
+    emptied,
     entry,
     mistyped,
     record,
@@ -79,6 +80,22 @@ DISAGREEMENTS: Cases = {
     "an earlier version, of straight links": (
         record("hand", "fingers", 0, "links", 1, "bend", drop=True),
         r"written by an earlier version \(no bend\): `casadi-hands solve .*--from",
+    ),
+    "a joint of the object": (
+        record("attached", value={"joint": "hinge"}),
+        r"attached: result\.json has a joint, task\.yaml has none",
+    ),
+    "a push on the world": (
+        record("goals", 1, "exert", value={"force": [0, 0, 100], "torque": [0, 0, 0]}),
+        r"goal 2 of result\.json is not that",
+    ),
+    "an empty table": (
+        emptied,
+        r"motion\.csv: not a table of numbers: empty",
+    ),
+    "torques off by little": (
+        arrays(joint_torques=lambda a: a * (1 + 1e-5)),
+        r"joint_torques: (?P<said>\S+) N·m .* need (?!(?P=said) )",
     ),
     "a later certificate": (record("certificate", value={"slip": {"value": 0.5, "limit": 0.0002}}), r"certificate"),
 }

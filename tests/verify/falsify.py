@@ -48,6 +48,11 @@ def refusal(folder: Path) -> str:
         return str(error)
 
 
+def emptied(folder: Path) -> None:
+    """A table without a word in it."""
+    (folder / "motion.csv").write_text("\n", encoding="utf-8")
+
+
 def both(*steps: Falsify) -> Falsify:
     """Several one after the other."""
 

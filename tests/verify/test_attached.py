@@ -12,6 +12,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
+from casadi_hands.export.design import Design
+from casadi_hands.export.record import design_record
 from casadi_hands.verify.checks.mount import mount_problems
 from casadi_hands.verify.figures.attached import attachment_figures, joint_residual, joint_speeds
 from casadi_hands.verify.figures.disturbances import external_problems
@@ -81,8 +83,8 @@ def resting(value: float) -> dict[str, np.ndarray]:
 
 
 def read(scene: Scene, directory: Path) -> Folder:
-    kind = next(iter(scene.task.object.attached.model_dump(exclude_none=True)))  # type: ignore[union-attr]
-    return read_folder(replace(scene, changes={"attached": {"joint": kind}}).write(directory / "result"))
+    stated = {"attached": design_record(Design(scene.task, "feasible"))["attached"]}
+    return read_folder(replace(scene, changes={**stated, **scene.changes}).write(directory / "result"))
 
 
 @pytest.mark.parametrize(("joint", "goal"), JOINTS)
@@ -205,3 +207,19 @@ def test_a_replay_starts_off_its_place_only_as_far_as_the_joint_lets_it(tmp_path
     plan = Plan(folder, world.step)
     world.settle(plan, lambda _, data: highest.append(float(data.time)))
     assert len(highest) == 500
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({}, []),
+        ({"joint": "slider"}, ["attached: result.json says slider, task.yaml says hinge"]),
+        ({"friction": 99.0}, ["attached: friction is 99.0 in result.json, which is not the task's"]),
+        ({"axis": [0.0, 0.0, 1.0]}, ["attached: axis is [0.0, 0.0, 1.0] in result.json, which is not the task's"]),
+        ({"point": None}, ["attached: point is none in result.json, which is not the task's"]),
+    ],
+)
+def test_the_joint_that_a_result_states_is_the_tasks(change: dict[str, Any], words: list[str], tmp_path: Path) -> None:
+    scene, _, _ = swinging(tmp_path, HINGE, "angle: 10")
+    stated = design_record(Design(scene.task, "feasible"))["attached"]
+    assert joint_problems(read(replace(scene, changes={"attached": {**stated, **change}}), tmp_path)) == words

@@ -109,6 +109,11 @@ def _goal_problems(folder: Folder) -> list[str]:
             if agree:
                 turn = Rotation.from_rotvec(goal.rotation.vector).inv()
                 agree = (turn * Rotation.from_quat(quaternion, scalar_first=True)).magnitude() < 1e-6
+        exerts = entry(other, "exert")
+        if goal.exert is None:
+            agree &= exerts is None
+        else:
+            agree &= all(same(entry(exerts, name), getattr(goal.exert, name)) for name in ("force", "torque"))
         if not agree:
             problems.append(f"goals: goal {number} of result.json is not that of task.yaml")
     return problems

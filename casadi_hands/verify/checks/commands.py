@@ -44,4 +44,5 @@ def _unlike(folder: Folder, name: str, due: np.ndarray, unit: str, words: str) -
         return []
     k, j = np.unravel_index(np.argmax(off), off.shape)
     at = f"of joint {motion.joint_names[j]} at {motion.time[k]:.3g} s"
-    return [f"{name}: {stated[k, j]:.4g} {unit} {at}, where {words} {due[k, j]:.4g} {unit}"]
+    digits = next((n for n in range(4, 17) if f"{stated[k, j]:.{n}g}" != f"{due[k, j]:.{n}g}"), 17)
+    return [f"{name}: {stated[k, j]:.{digits}g} {unit} {at}, where {words} {due[k, j]:.{digits}g} {unit}"]

@@ -33,8 +33,11 @@ def table_problems(folder: Folder) -> list[str]:
     path = folder.path / "motion.csv"
     if not os.path.lexists(path):
         return []
+    text = read_text(path)
+    if not text.strip():
+        raise DesignError(f"{path}: not a table of numbers: empty")
     try:
-        names, *rows = csv.reader(io.StringIO(read_text(path), newline=""))
+        names, *rows = csv.reader(io.StringIO(text, newline=""))
         values = np.array([[float(word) for word in row] for row in rows])
     except (ValueError, csv.Error) as error:
         raise DesignError(f"{path}: not a table of numbers: {error}") from None

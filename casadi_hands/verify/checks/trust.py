@@ -5,13 +5,18 @@ from __future__ import annotations
 from typing import Any
 
 from casadi_hands.task import Task
+from casadi_hands.task.shown import escaped
 from casadi_hands.verify.reading.folder import Folder
 from casadi_hands.verify.report import UNIT_OF, show
 
 _INTENT = ("about", "name", "search", "weights", "limits", "time_step", "keyframes_between")
 """Sections that say how to look for a design, or what to ask of it, and not what it is."""
+_READ = {
+    *("task.yaml", "hand.urdf", "object.urdf", "scene.xml", "motion.npz", "motion.csv", "result.json"),
+    "meshes",
+}
 _NAMED = 5
-"""Differences that are named one by one."""
+"""Differences, and files, that are named one by one."""
 
 
 def task_problems(folder: Folder) -> list[str]:
@@ -43,6 +48,14 @@ def limit_notes(folder: Folder) -> tuple[str, ...]:
         if folder.trusted is not None and value != judged[name]:
             notes.append(f"{shown}, {_shown(name, judged[name])} in {folder.trusted}, which is what counts")
     return tuple(notes)
+
+
+def unread_notes(folder: Folder) -> tuple[str, ...]:
+    """Return which files of the folder no audit reads: pages and logs, whoever wrote them."""
+    names = sorted(each.name for each in folder.path.iterdir() if each.name not in _READ)
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    shown = ", ".join(escaped(name, 60) for name in names[:_NAMED])
+    return (f"not looked at: {shown}{more}",) if names else ()
 
 
 def _shown(name: str, value: float) -> str:

@@ -95,6 +95,7 @@ def read_robot(path: Path) -> Robot:
             strange += _compiler(element)
         elif element.tag == "transmission":
             strange += _transmission(element, {joint.get("name") for joint in root.findall("joint")})
+    strange += _transmissions(root, joints)
     return Robot(links, joints, tuple(f"{path.name}: {what}" for what in strange), text)
 
 
@@ -114,6 +115,15 @@ def _transmission(element: Element, joints: set[str | None]) -> list[str]:
         if (ratio.text or "").strip() not in ("1", "1.0"):
             found.append(f"{called(element)} reduces by {(ratio.text or 'nothing').strip()[:20]}, not by 1")
     return found
+
+
+def _transmissions(root: Element, joints: dict[str, Joint]) -> list[str]:
+    """Return which joints have not one motor each, where any has: those that follow no other must."""
+    turned = [joint.get("name") for each in root.findall("transmission") for joint in each.findall("joint")]
+    counts = {name: turned.count(name) for name, joint in joints.items() if joint.mimic is None or name in turned}
+    return [
+        f"joint {name} has {count} transmissions, not one" for name, count in counts.items() if turned and count != 1
+    ]
 
 
 def _read_joint(path: Path, name: str, element: Element) -> Joint:
