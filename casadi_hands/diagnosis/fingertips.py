@@ -18,7 +18,8 @@ from casadi_hands.task import Task
 from casadi_hands.task.obstacles import distance_from_disc
 
 Array = NDArray[np.float64]
-_APART = 0.75  # of a link's diameter: stages move contacts apart that overlap by less
+APART = 0.75
+"""Of a fingertip's diameter: stages move contacts apart that overlap by less."""
 _ROOM = 0.25  # of a link's radius: depths below that are made up for by a little shift of the contact
 _AROUND = math.radians(135)  # between a contact's outward normal and the way back to the palm
 
@@ -27,7 +28,7 @@ def fingertip_findings(task: Task, model: Model) -> Iterator[Finding]:
     """What is wrong with the room of fingertips at the start, where the fingers of a palm touch the object."""
     normals = -inward_normals(model.patches, model.touched)[: model.contacts]
     points = model.patches[: model.contacts]
-    yield from _in_each_other(model, points, normals)
+    yield from _overlap(model, points, normals)
     if task.draws:
         return
     _, position, vector = task.goal_poses()[0]
@@ -58,15 +59,13 @@ def _what(model: Model) -> str:
     return "fingertips" if model.tip_radius > model.link_radius else "links"
 
 
-def _in_each_other(model: Model, points: Array, normals: Array) -> Iterator[Finding]:
+def _overlap(model: Model, points: Array, normals: Array) -> Iterator[Finding]:
     """Two fingertips at their contacts (C, 3) are in each other; of several pairs the closest."""
-    tips = points + model.tip_radius * normals
-    pairs = [(float(np.linalg.norm(tips[i] - tips[j])), i, j) for i, j in combinations(range(len(tips)), 2)]
-    wide = 2 * model.tip_radius
-    if not pairs or min(pairs)[0] >= wide:
+    closest = in_each_other(model, points, normals)
+    if closest is None:
         return
-    apart, i, j = min(pairs)
-    first, second = model.contact_names[i], model.contact_names[j]
+    i, j, apart = closest
+    wide, (first, second) = 2 * model.tip_radius, (model.contact_names[k] for k in (i, j))
     what = (
         f"the fingertips of '{first}' and '{second}' overlap by {mm(model, wide - apart)} where they touch the object "
         f"(fingers.{second}.touches): their centres are {mm(model, apart)} apart, and {_what(model)} are "
@@ -76,7 +75,21 @@ def _in_each_other(model: Model, points: Array, normals: Array) -> Iterator[Find
     field = _field(model)
     if model.tip_radius > model.link_radius > radius / model.units.length:
         field += " and hand.link_radius"
-    yield found(what, f"contacts farther apart, or {field} below {radius:.3g}", certain=apart < _APART * wide)
+    yield found(what, f"contacts farther apart, or {field} below {radius:.3g}", certain=apart < APART * wide)
+
+
+def in_each_other(model: Model, points: Array, normals: Array) -> tuple[int, int, float] | None:
+    """The two fingertips that are deepest in each other at contacts (C, 3), and how far apart; None where none are.
+
+    Args:
+        model: gives their radius.
+        points: of the contacts, object frame.
+        normals: outward.
+    """
+    tips = points + model.tip_radius * normals
+    pairs = [(float(np.linalg.norm(tips[i] - tips[j])), i, j) for i, j in combinations(range(len(tips)), 2)]
+    apart, i, j = min(pairs, default=(math.inf, 0, 0))
+    return (i, j, apart) if apart < 2 * model.tip_radius else None
 
 
 def _depth(task: Task, model: Model, turn: Array, place: Array, point: Array, normal: Array) -> tuple[float, str]:

@@ -20,7 +20,7 @@ from casadi_hands.task import Task
 Array = NDArray[np.float64]
 _MOST_FRICTION = 4.0  # beyond that of any fingertip
 _FAR = np.radians(30)  # that an object's turn carries a contact, beyond which fingers may take it anew on the way
-_BETTER = "contacts that surround the object better or oppose each other"
+BETTER = "contacts that surround the object better or oppose each other"
 
 
 def grasp_findings(task: Task, model: Model) -> Iterator[Finding]:
@@ -73,7 +73,7 @@ def _one_sided(model: Model) -> Iterator[Finding]:
         "nothing stops the object: all fingers push it to one side (fingers), none pushes back, and it must start and "
         "end at rest"
     )
-    yield found(what, _BETTER, certain)
+    yield found(what, BETTER, certain)
 
 
 def _lost(task: Task, model: Model) -> Iterator[Finding]:
@@ -93,10 +93,10 @@ def _lost(task: Task, model: Model) -> Iterator[Finding]:
         what = (
             f"at {moment(model.schedule, time)} the fingers cannot hold the object against {_against(model, each)} "
             f"with friction {model.friction:g} (friction), however hard they press, {where}: "
-            f"{_wrench(model, missing)} missing"
+            f"{wrench_words(model, missing)} missing"
         )
         least = _least_friction(model, each)
-        advice = _BETTER if least is None else f"friction of {least:.2g} or more, or {_BETTER}"
+        advice = BETTER if least is None else f"friction of {least:.2g} or more, or {BETTER}"
         yield found(what, advice, certain)
         return
 
@@ -163,7 +163,8 @@ def _against(model: Model, load: Acting) -> str:
     return " and ".join(parts)
 
 
-def _wrench(model: Model, wrench: Array) -> str:
+def wrench_words(model: Model, wrench: Array) -> str:
+    """How much force and torque a wrench (6,) has, in words."""
     force, torque = (float(np.linalg.norm(part)) for part in (wrench[:3], wrench[3:]))
     parts = [f"a force of {force:.2g} weights"] if force > HELD / 2 else []
     parts += [f"a torque of {1e3 * torque * model.units.torque:.3g} mN·m"] if torque > HELD / 2 else []

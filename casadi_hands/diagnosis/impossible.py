@@ -16,6 +16,7 @@ from casadi_hands.diagnosis.grasps import grasp_findings
 from casadi_hands.diagnosis.moment import moment
 from casadi_hands.diagnosis.places import place_findings
 from casadi_hands.diagnosis.reason import Reason
+from casadi_hands.diagnosis.regrasps import regrasp_findings
 from casadi_hands.problem.inertia import capsule_inertial
 from casadi_hands.problem.loads import Load, hardest_load, usual_force_limit
 from casadi_hands.problem.model import Model
@@ -41,7 +42,7 @@ def findings(task: Task, model: Model) -> list[Finding]:
         return [each for each in places if each.certain] or places
     places = [*light, *place_findings(task, model), *fingertip_findings(task, model)]
     forces = [*_too_weak(task, model), *_weak_motors(task, model)]
-    every = [*places, *grasp_findings(task, model), *forces]
+    every = [*places, *grasp_findings(task, model), *regrasp_findings(task, model), *forces]
     # Beside what is certain, the likely may follow from it.
     return [each for each in every if each.certain] or [*every, *_hard(task, model)]
 
