@@ -34,11 +34,12 @@ def check_summary(
     """
     if proposal is None and not task.is_placed:
         proposal = propose(task)
+    stood = task  # the palm was, before contacts were
     if proposal is not None and proposal.sets:
         task = proposal.sets[0].in_task(task)
     model = build_model(task)
     table = Table.grid(padding=(0, 2))
-    for name, text in _lines(task, model.force_limit):
+    for name, text in _lines(task, stood, model.force_limit):
         table.add_row(Text(name, style="bold"), Text(text))
     title = Text.assemble((task.name, "bold"), f": {' '.join(task.about.split())}" if task.about else "")
     found = findings(task, model)
@@ -74,7 +75,7 @@ def placement_summary(proposal: Proposal) -> list[RenderableType]:
     return [Text(), Text(words), table]
 
 
-def _lines(task: Task, force_limit: float) -> Iterator[tuple[str, str]]:
+def _lines(task: Task, stood: Task, force_limit: float) -> Iterator[tuple[str, str]]:
     yield "object", _object(task)
     for mesh in task.object.meshes or ():
         yield "", f"{mesh.file}: {mesh.sentence}"
@@ -82,7 +83,7 @@ def _lines(task: Task, force_limit: float) -> Iterator[tuple[str, str]]:
     if task.object.attached is not None:
         yield "", _joint(task.object.attached)
     yield "palm", _palm(task)
-    yield from _standing(task)
+    yield from _standing(stood)
     for i, (name, finger) in enumerate(task.fingers.items()):
         yield "" if i else "fingers", f"{name} {_touches(finger)}"
     most = f"{force_limit:g} weights ({force_limit * task.force_unit:.3g} N)"

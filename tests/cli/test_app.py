@@ -25,6 +25,7 @@ from casadi_hands.export.mjcf import scene_mjcf
 from casadi_hands.pipeline import Progress
 from casadi_hands.pipeline.alternatives import Alternative
 from casadi_hands.task import load_task
+from casadi_hands.task.palm_place import standing
 from casadi_hands.verify import Perturbation, Replay, Replays
 from casadi_hands.verify.replays.replay import GoalError
 from tests.export.example import TASK, example_design, example_task
@@ -538,6 +539,7 @@ fingers: 3
     )
     found = run("check", path, "--show", page)
     assert found.exit_code == 0
-    assert "placed by the program: contacts are" in " ".join(found.output.split())
+    # As `solve` and placement.json say it, of the palm before contacts are placed.
+    assert f"placed by the program: {standing(load_task(path))}" in " ".join(found.output.split())
     assert "set 1 of" in page.read_text()
     assert "finger1 (2)" in page.read_text()

@@ -171,7 +171,7 @@ def test_an_object_off_its_joint_is_found_out(tmp_path: Path) -> None:
     scene, _, _ = swinging(tmp_path, HINGE, "angle: 10")
     off = scene.motion.object_position + np.where(np.arange(41)[:, None] == 16, [0, 0, 1e-4], 0.0)
     (problem,) = joint_problems(read(scene.moved(object_position=off), tmp_path))
-    assert "at 0.4 s the object is 0.0001 m" in problem
+    assert "at 0.4 s the object is 0.1 mm and 0° off the joint" in problem
     missing = scene.moved(attachment_friction=None)
     assert joint_problems(read(missing, tmp_path)) == ["attachment_friction: missing, though a joint holds the object"]
 
