@@ -164,14 +164,15 @@ class Axes(Section):
     from_link: Pair = Field(
         default=(60.0, 90.0),
         description="Smallest and largest angle between a joint's axis and the links beside it, degrees. Below some 60 "
-        "a joint twists its link more than it bends the finger, and its bearing bears what the motor should.",
+        "a joint twists its link more than it bends the finger, and its bearing bears what the motor should. [90, 90] "
+        "gives joints square to their links.",
     )
 
     @field_validator("from_link")
     @classmethod
     def _angles_in_order(cls, value: Pair) -> Pair:
-        if not 0 <= value[0] < value[1] <= 90:
-            raise refuse("[least, largest] in degrees with 0 <= least < largest <= 90")
+        if not 0 <= value[0] <= value[1] <= 90:
+            raise refuse("[least, largest] in degrees with 0 <= least <= largest <= 90")
         return value
 
 

@@ -538,13 +538,8 @@ SPOILT = {
         "hand: {axes: {from_link: [90, 60]}}\nname:",
         (
             "1: hand.axes.from_link: given [90, 60]; allowed: [least, largest] in degrees with "
-            "0 <= least < largest <= 90"
+            "0 <= least <= largest <= 90"
         ),
-    ),
-    "one angle of axes alone": (
-        "name:",
-        "hand: {axes: {from_link: [75, 75]}}\nname:",
-        "1: hand.axes.from_link: given [75, 75]; allowed: [least, largest] in degrees...",
     ),
     "angles of axes beyond across": (
         "name:",
