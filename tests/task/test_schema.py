@@ -80,7 +80,7 @@ LEFT_TO_CHECK = """
     object below the ground; palm below the ground; waypoints out of order; perturbation backwards;
     perturbation after the end; lengths reversed; hinge too short for its links; hinge as long as the shortest link;
     fingertip thinner than links; fingertip too thick for its link;
-    joint limits reversed; joint limits too wide; angles of axes reversed; one angle of axes alone;
+    joint limits reversed; joint limits too wide; angles of axes reversed;
     angles of axes beyond across; angle of axes below along;
     10,000 samples; an hour; a direction that rounds to none; contacts that the surface brings together;
     in millimetres; no such file; edges too round; another format;
