@@ -1,6 +1,7 @@
 """What the user asks for: the task file's schema, its reader, its writer."""
 
-from casadi_hands.task.hand import Actuator, FingerSpec, Fingertip, Ground, HandSpec
+from casadi_hands.task.finger import FingerSpec
+from casadi_hands.task.hand import Actuator, Fingertip, Ground, HandSpec
 from casadi_hands.task.limits import Limits
 from casadi_hands.task.loader import load_task, parse_task
 from casadi_hands.task.motion import Goal, Perturbation

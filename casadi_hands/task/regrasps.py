@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from casadi_hands.task.hand import Regrasp
+from casadi_hands.task.finger import Regrasp
 from casadi_hands.task.problem import Problem
 from casadi_hands.task.task import Task
 

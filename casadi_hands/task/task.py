@@ -12,11 +12,11 @@ from pydantic import BeforeValidator, Field, PrivateAttr, ValidationInfo, field_
 from casadi_hands.errors import TaskError
 from casadi_hands.motion import nearest_exponential
 from casadi_hands.task.fields import Positive, Section, Vector, Whole, fill, follows, refuse
+from casadi_hands.task.finger import FingerSpec
 from casadi_hands.task.given import Given, merged, plain
 from casadi_hands.task.hand import (
     SHORTEST_LINK,
     Actuator,
-    FingerSpec,
     Fingertip,
     Ground,
     HandSpec,
