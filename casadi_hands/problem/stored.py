@@ -73,13 +73,13 @@ def read_bytes(path: Path, most: int) -> bytes:
 
 
 def read_text(path: Path) -> str:
-    """Return a text file's content.
+    """Return a text file's content, without the mark of its encoding that some editors begin it with.
 
     Raises:
         DesignError: as `read_bytes`, or it is not UTF-8.
     """
     try:
-        return read_bytes(path, LARGEST_TEXT).decode("utf-8")
+        return read_bytes(path, LARGEST_TEXT).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise DesignError(f"{path}: not text in UTF-8: {error.reason} at byte {error.start}") from None
 

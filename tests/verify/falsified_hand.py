@@ -23,6 +23,7 @@ from tests.verify.falsify import (
     removed,
     task,
     text,
+    whole,
 )
 
 HAND_AGAINST_TASK: Cases = {
@@ -260,6 +261,27 @@ HIDDEN: Cases = {
     "a centre of mass elsewhere": (
         attribute(HAND, NEXT + "/inertial/origin", "xyz", "0 0 0"),
         r"its centre of mass in hand\.urdf",
+    ),
+    "a document type in disguise": (
+        text(SCENE, "<mujoco model=", '<?a <!-- ?><!DOCTYPE mujoco [<!ATTLIST option x CDATA "-->">]><mujoco model='),
+        r"scene\.xml: has instructions for programs",
+    ),
+    "a document type behind a comment": (
+        text(SCENE, "<mujoco model=", '<!-- a --><!DOCTYPE mujoco [<!ATTLIST option x CDATA "1">]><mujoco model='),
+        r"scene\.xml: declares a document type",
+    ),
+    "another encoding": (
+        whole(OBJECT, '<?xml version="1.0" encoding="utf-7"?><robot name="object"/>'),
+        r"object\.urdf: declares the encoding utf-7",
+    ),
+    "a shape that is scaled": (
+        edited(HAND, NEXT + "/collision/geometry/sphere", lambda e, p: e.set("scale", "2 2 2")),
+        r"<sphere>: the format has no attribute scale there",
+    ),
+    "a mass in grams": (attribute(OBJECT, ".//mass", "unit", "g"), r"<mass>: the format has no attribute unit there"),
+    "a frame that some turn": (
+        attribute(HAND, JOINT + "/origin", "quat_xyzw", "1 0 0 0"),
+        r"<origin>: the format has no attribute quat_xyzw there",
     ),
     "a document type": (
         text(HAND, "<robot", '<!DOCTYPE r [<!ENTITY a "0">]><robot'),

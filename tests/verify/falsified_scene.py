@@ -134,6 +134,18 @@ IN_THE_SCENE: Cases = {
     "a joint's reference": (attribute(SCENE, BODY + "/joint", "ref", "0"), r"its angle at the start"),
     "a joint without limits": (attribute(SCENE, BODY + "/joint", "limited", "false"), r"has no limits"),
     "a joint with a spring": (attribute(SCENE, BODY + "/joint", "stiffness", "9"), r"no attribute stiffness"),
+    "a shelf that goes where the palm is led": (
+        added(SCENE, ".//body[@name='palm_target']", "<geom type='sphere' size='0.1' friction='0.9 0.00108 0'/>"),
+        r"the palm_target has solids or mass, and is only a place",
+    ),
+    "a weight there": (
+        added(
+            SCENE,
+            ".//body[@name='palm_target']",
+            "<inertial pos='0 0 0' mass='1' fullinertia='1 1 1 0 0 0'/>",
+        ),
+        r"the palm_target has solids or mass",
+    ),
     "an extra body": (added(SCENE, "worldbody", "<body name='post'/>"), r"body post is in no other file"),
     "a body twice": (added(SCENE, "worldbody", "<body name='object'/>"), r"two <body name=\"object\">"),
     "bodies that pass through each other": (

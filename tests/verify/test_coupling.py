@@ -20,6 +20,7 @@ from casadi_hands.problem.coupling import fit_coupling
 from casadi_hands.problem.drive import Drive
 from casadi_hands.verify import Perturbation, replay
 from casadi_hands.verify.audit import audit_files
+from casadi_hands.verify.checks.drive import drive_problems
 from casadi_hands.verify.figures.coupling import coupling_figures
 from casadi_hands.verify.reading.folder import read_folder
 from casadi_hands.verify.replays.plan import Plan
@@ -90,6 +91,12 @@ def test_a_hand_with_more_motors_than_asked_for_is_not_certified(tmp_path: Path)
     figures = {figure.name: figure for figure in coupling_figures(read_folder(folder))}
     assert figures["motors"].value == 6.0
     assert not figures["motors"].holds
+
+
+def test_a_task_that_wants_a_motor_a_joint_has_one(tmp_path: Path) -> None:
+    scene = shared(tmp_path / "task")
+    folder = write(replace(scene, task=scene.task.model_copy(update={"motors": "independent"})), tmp_path / "result")
+    assert "motors: 3 share the joints, where the task has one for every joint" in drive_problems(read_folder(folder))
 
 
 Falsify = Callable[[Path], None]

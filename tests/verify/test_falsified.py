@@ -14,6 +14,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from casadi_hands.export.table import motion_table
+from casadi_hands.task import load_task, task_to_yaml
 from casadi_hands.verify.audit import audit, audit_files
 from casadi_hands.verify.reading.folder import read_folder
 from tests.verify.falsified_files import DISAGREEMENTS
@@ -25,6 +26,7 @@ from tests.verify.falsify import (
     HAND,
     LINK,
     SCENE,
+    THING,
     Falsify,
     added,
     arrays,
@@ -174,6 +176,39 @@ def test_a_trusted_task_judges_and_says_what_the_folder_says_otherwise(good: Pat
     task("density: 1240.0", "density: 1000.0")(bad)
     found = audit(bad, task=trusted, replays=0)
     assert f"task.yaml is not {trusted}: hand.density (1000.0, there 1240.0)" in found.problems
+
+
+def test_of_a_trusted_task_the_order_of_fingers_says_nothing(good: Path, tmp_path: Path) -> None:
+    """Though links are numbered by the folder's own."""
+    trusted = tmp_path / "trusted.yaml"
+    written = load_task(good / "task.yaml")
+    names = list(written.fingers)
+    reversed_ = {name: written.fingers[name] for name in reversed(names)}
+    trusted.write_text(task_to_yaml(written.model_copy(update={"fingers": reversed_})), encoding="utf-8")
+    assert list(load_task(trusted).fingers) == names[::-1] != names
+    assert audit(good, task=trusted, replays=0).reasons == []
+
+
+def test_a_file_may_begin_with_the_mark_of_its_encoding(good: Path, bad: Path) -> None:
+    for name in ("result.json", "scene.xml", "hand.urdf"):
+        (bad / name).write_bytes(b"\xef\xbb\xbf" + (good / name).read_bytes())
+    assert audit(bad, replays=0).reasons == []
+
+
+def test_solids_are_compared_both_ways(tmp_path: Path) -> None:
+    """A task may have one shape twice: a scene that has it once has room for another."""
+    twice = carried(tmp_path / "task")
+    shapes = twice.task.object.shapes
+    twice = replace(
+        twice,
+        task=twice.task.model_copy(
+            update={"object": twice.task.object.model_copy(update={"shapes": (*shapes, *shapes)})}
+        ),
+    )
+    folder = twice.write(tmp_path / "twice")
+    assert not any("solids of the object" in reason for reason in audit_files(folder).reasons)
+    edited(SCENE, f"{THING}/geom", lambda e, p: e.set("size", "0.001"))(folder)
+    assert any("solids of the object" in reason for reason in audit_files(folder).reasons)
 
 
 def test_a_trusted_task_is_the_users_own_words(good: Path, scene: Scene, tmp_path: Path) -> None:

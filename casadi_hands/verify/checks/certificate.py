@@ -66,6 +66,8 @@ def replay_problems(directory: str | Path, played: Replays) -> list[str]:
     if not entries:
         return []
     first, due, problems = entries[0], played.record(), []
+    if len(entries) > 1:
+        problems.append(f"replays: result.json has {len(entries)} of {played.engine}")
     if entry(first, "dropped_as_planned") is not due["dropped_as_planned"]:
         how = "drops" if due["dropped_as_planned"] else "holds"
         problems.append(f"replays: result.json says otherwise, but the hand {how} the object as planned")

@@ -24,6 +24,8 @@ def drive_problems(folder: Folder) -> list[str]:
     due = len(motion.joint_names) if drive is None else drive.ratios.shape[1]
     problems = [] if stated in (None, due) else [f"motors: result.json says {stated}, there are {due}"]
     problems += _mimic_problems(folder, drive)
+    if drive is not None and folder.task.motors == "independent":
+        problems.append(f"motors: {due} share the joints, where the task has one for every joint")
     return problems if drive is None else [*problems, *_ratio_problems(folder, drive), *_limit_problems(folder, drive)]
 
 

@@ -44,8 +44,10 @@ def scene_problems(folder: Folder) -> list[str]:
 
 
 def palm_moves(folder: Folder) -> bool:
-    """Whether the palm's pose changes over the motion."""
-    motion = folder.motion
+    """Whether the palm's pose changes over the motion, where the task lets it."""
+    motion, palm = folder.motion, folder.task.palm
+    if not palm.may_move and len(palm.waypoints) == 1:
+        return False
     shift = np.abs(motion.base_position - motion.base_position[0]).max() / folder.task.palm.radius
     turn = 1 - np.abs(motion.base_orientation @ motion.base_orientation[0]).min()
     return bool(shift > 1e-9 or turn > 1e-9)
@@ -112,6 +114,8 @@ def _body_problems(folder: Folder, scene: Scene) -> list[str]:
             problems.append(f"the weight of {who} is {taken} (gravcomp)")
         if name in due:
             problems += _solid_problems(folder, who, body, due[name])
+        elif body.geoms or body.mass:
+            problems.append(f"{who} has solids or mass, and is only a place for the palm to follow")
         loose = folder.task.object.attached is None
         if body.mocap != (name == "palm_target") or body.free != (
             (name == "object" and loose) or (name == "palm" and moves)
@@ -155,6 +159,8 @@ def _solid_problems(folder: Folder, who: str, body: SceneBody, due: Body) -> lis
         problems.append(f"inertia or centre of mass of {who} is not that of {file}")
     found = [geom.shape for geom in body.geoms if geom.shape is not None]
     missing = [shape for shape in due.shapes if not any(shape.agrees(other) for other in found)]
+    # Both ways: the task may have one shape twice.
+    missing += [other for other in found if not any(shape.agrees(other) for shape in due.shapes)]
     if missing or len(body.geoms) != len(due.shapes):
         problems.append(f"the solids of {who} are not those of {file}")
     return problems

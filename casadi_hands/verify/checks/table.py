@@ -39,8 +39,8 @@ def table_problems(folder: Folder) -> list[str]:
     try:
         names, *rows = csv.reader(io.StringIO(text, newline=""))
         values = np.array([[float(word) for word in row] for row in rows])
-    except (ValueError, csv.Error) as error:
-        raise DesignError(f"{path}: not a table of numbers: {error}") from None
+    except (ValueError, csv.Error):
+        raise DesignError(f"{path}: not a table of numbers") from None
     due = _columns(folder)
     if values.shape != (len(folder.motion.time), len(names)) or not np.all(np.isfinite(values)):
         return ["motion.csv: has not a row of finite numbers for each sample of motion.npz"]

@@ -190,7 +190,7 @@ def read_folder(directory: str | Path, task: str | Path | None = None) -> Folder
     motors = None if motion.motor_positions is None else motion.motor_positions.shape[1]
     folder = Folder(
         path=path,
-        task=written if task is None else load_task(task),
+        task=written if task is None else _numbered(load_task(task), written),
         written=written,
         trusted=None if task is None else Path(task),
         motion=motion,
@@ -209,6 +209,13 @@ def read_folder(directory: str | Path, task: str | Path | None = None) -> Folder
         if not np.all(np.abs(goal.rotation.vector) < FARTHEST_TURN):
             raise DesignError(f"{task or path / 'task.yaml'}: goal {number} turns the object by more than can be told")
     return folder
+
+
+def _numbered(task: Task, written: Task) -> Task:
+    """The task with its fingers in the order of another that names the same; links are numbered by it."""
+    if set(task.fingers) != set(written.fingers):
+        return task
+    return task.model_copy(update={"fingers": {name: task.fingers[name] for name in written.fingers}})
 
 
 def _object(path: Path, robot: Robot) -> Body:

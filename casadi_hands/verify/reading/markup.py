@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
+from xml.parsers import expat
 
 import numpy as np
 
@@ -38,11 +39,9 @@ def read_xml(path: Path, root: str) -> Element:
             or names another file.
     """
     text = read_text(path)
-    if "<!" in re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL):
-        raise DesignError(f"{path}: declares a document type; the format has none")
+    _check_declared(path, text)
     try:
         tree = ElementTree.fromstring(text)
-    # ValueError and LookupError of encodings that it declares.
     except (ElementTree.ParseError, ValueError, LookupError, RecursionError) as error:
         raise DesignError(f"{path}: not XML: {error}") from None
     if tree.tag != root:
@@ -60,6 +59,30 @@ def read_xml(path: Path, root: str) -> Element:
             if name not in _NAMES and not {word.lstrip("+-").lower() for word in text.split()}.isdisjoint(_NONE):
                 raise DesignError(f"{path}: {called(element)}: {name} is '{text[:60]}', which is not finite")
     return tree
+
+
+def _check_declared(path: Path, text: str) -> None:
+    """Refuse what a reader of one kind heeds and another does not: document types, instructions, other encodings.
+
+    Raises:
+        DesignError: the text has one, or is not XML.
+    """
+
+    def refuse(words: str) -> None:
+        raise DesignError(f"{path}: {words}")
+
+    def declared(_version: str, encoding: str | None, _standalone: int) -> None:
+        if encoding is not None and encoding.lower() not in ("utf-8", "us-ascii"):
+            refuse(f"declares the encoding {encoding[:40]}; the format is UTF-8")
+
+    parser = expat.ParserCreate("utf-8")
+    parser.StartDoctypeDeclHandler = lambda *_: refuse("declares a document type; the format has none")
+    parser.ProcessingInstructionHandler = lambda *_: refuse("has instructions for programs; the format has none")
+    parser.XmlDeclHandler = declared
+    try:
+        parser.Parse(text.encode("utf-8"), True)
+    except (expat.ExpatError, ValueError, LookupError) as error:
+        raise DesignError(f"{path}: not XML: {error}") from None
 
 
 def _check_own(path: Path, element: Element) -> None:

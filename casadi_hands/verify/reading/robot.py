@@ -19,6 +19,27 @@ from casadi_hands.verify.reading.points import read_points
 from casadi_hands.verify.reading.triangles import read_raw_mesh
 from casadi_hands.verify.shapes import Capsule, Cylinder, Shape
 
+_ATTRIBUTES = {
+    "origin": "xyz rpy",
+    "geometry": "",
+    "sphere": "radius",
+    "cylinder": "radius length",
+    "box": "size",
+    "mesh": "filename",
+    "visual": "name",
+    "collision": "name",
+    "inertial": "",
+    "mass": "value",
+    "inertia": "ixx ixy ixz iyy iyz izz",
+    "parent": "link",
+    "child": "link",
+    "axis": "xyz",
+    "limit": "lower upper effort velocity",
+    "material": "name",
+    "color": "rgba",
+}
+"""Of each element those that the format has: others might scale or turn what they are on, to some reader."""
+
 
 @dataclass(frozen=True)
 class Joint:
@@ -96,6 +117,9 @@ def read_robot(path: Path) -> Robot:
         elif element.tag == "transmission":
             strange += _transmission(element, {joint.get("name") for joint in root.findall("joint")})
     strange += _transmissions(root, joints)
+    for element in root.iter():
+        odd = sorted(set(element.attrib) - set(_ATTRIBUTES.get(element.tag, " ".join(element.attrib)).split()))
+        strange += [f"{called(element)}: the format has no attribute {name[:60]} there" for name in odd]
     return Robot(links, joints, tuple(f"{path.name}: {what}" for what in strange), text)
 
 
