@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
@@ -41,7 +42,7 @@ def findings(task: Task, model: Model) -> list[Finding]:
         places = [*light, *place_findings(task, model)]
         return [each for each in places if each.certain] or places
     places = [*light, *place_findings(task, model), *fingertip_findings(task, model)]
-    forces = [*_too_weak(task, model), *_weak_motors(task, model)]
+    forces = [*_too_weak(task, model), *_weak_motors(task, model), *_slow_motors(task, model)]
     every = [*places, *grasp_findings(task, model), *regrasp_findings(task, model), *forces]
     # Beside what is certain, the likely may follow from it.
     return [each for each in every if each.certain] or [*every, *_hard(task, model)]
@@ -117,6 +118,29 @@ def _weak_motors(task: Task, model: Model) -> Iterator[Finding]:
     stronger = [name for name, other in SERVOS.items() if other.continuous >= least] if servo else []
     advice = f"a stronger servo ({', '.join(stronger)})" if stronger else "stronger motors (actuator.torque)"
     yield found(what, f"{advice}, a lighter object, more friction or more fingers")
+
+
+def _slow_motors(task: Task, model: Model) -> Iterator[Finding]:
+    """The motors are too slow to carry the object from goal to goal, if its contacts go where it goes."""
+    speed, palm = task.actuator.speed, task.palm
+    if speed is None or palm.may_move or len(palm.waypoints) > 1 or task.motors != "independent":
+        return
+    # Of n joints a lengths apart the outermost moves the tip by a, the next one by twice that, and so on.
+    joints, longest = task.search.max_joints, task.hand.link_length[1]
+    fastest = speed * longest * joints * (joints + 1) / 2
+    legs = [
+        (float(np.linalg.norm(there - here)), start, end)
+        for (start, here, _), (end, there, _) in pairwise(task.goal_poses())
+    ]
+    distance, start, end = max(legs, key=lambda leg: leg[0] / (leg[2] - leg[1]), default=(0.0, 0.0, 1.0))
+    needed = distance / (end - start)
+    if needed > fastest:
+        what = (
+            f"from {start:.3g} s to {end:.3g} s the object goes {1e3 * distance:.3g} mm, by {1e3 * needed:.3g} mm/s; "
+            f"fingers of {joints} joints of {1e3 * longest:.3g} mm (search.max_joints, hand.link_length) move tips "
+            f"by {1e3 * fastest:.3g} mm/s at most with motors of {speed:.3g} rad/s (actuator.speed)"
+        )
+        yield found(what, "faster motors (actuator.speed) or slower goals", certain=False)
 
 
 def _hard(task: Task, model: Model) -> Iterator[Finding]:

@@ -46,6 +46,27 @@ def test_an_object_behind_the_palm() -> None:
     assert text.endswith("try palm.facing [0, 0, -1]")
 
 
+@pytest.mark.parametrize("share", [0.9, 1.1])
+def test_motors_too_slow_for_the_way_from_goal_to_goal(share: float) -> None:
+    """The tip of three links of 50 mm goes 300 mm for each radian that all its joints turn."""
+    links = "hand: {link_length: [0.02, 0.05]}\nsearch: {max_joints: 3}"
+    task = parse_task(
+        f"""
+object: {{mass: 0.1, shapes: [{{sphere: {{center: [0, 0, 0], radius: 0.03}}}}]}}
+palm: {{radius: 0.04, position: [0, 0, 0.3], facing: [0, 0, -1]}}
+motion: [{{at: 0, position: [0, 0, 0.2]}}, {{at: 2, position: [0, 0, 0.19]}}, {{at: 3, position: [0.006, 0, 0.19]}}]
+fingers: {{left: {{touches: [0, -0.03, 0]}}, right: {{touches: [0, 0.03, 0]}}}}
+actuator: {{speed: {share * 0.006 / 0.3}}}
+{links}
+"""
+    )
+    slow = [each for each in findings(task, build_model(task)) if "actuator.speed" in each.reason.text]
+    assert not any(each.certain for each in slow)  # contacts may roll some of the way
+    assert [each.reason.text[:58] for each in slow] == ["from 2 s to 3 s the object goes 6 mm, by 6 mm/s; fingers o"][
+        : share < 1
+    ]
+
+
 def test_an_object_of_which_a_part_is_before_the_palm_or_comes_before_it_is_not_behind() -> None:
     beside = "[{at: 0, position: [0.2, 0, 0.271]}, {at: 2, position: [0.2, 0, 0.271]}]"
     assert told("position: [0, 0, 0.3], facing: [0, 0, 1]", beside) == []
