@@ -14,31 +14,11 @@ from casadi_hands.errors import DesignError
 from casadi_hands.verify.bodies import Body, joined
 from casadi_hands.verify.flat import Box, Convex
 from casadi_hands.verify.raw_mesh import RawMesh
-from casadi_hands.verify.reading.markup import called, name_of, number, numbers, only, positive, read_xml, strangers
+from casadi_hands.verify.reading.markup import name_of, number, numbers, only, positive, read_xml, strangers
 from casadi_hands.verify.reading.points import read_points
 from casadi_hands.verify.reading.triangles import read_raw_mesh
+from casadi_hands.verify.reading.vocabulary import attribute_words, compiler_words, motor_words, transmission_words
 from casadi_hands.verify.shapes import Capsule, Cylinder, Shape
-
-_ATTRIBUTES = {
-    "origin": "xyz rpy",
-    "geometry": "",
-    "sphere": "radius",
-    "cylinder": "radius length",
-    "box": "size",
-    "mesh": "filename",
-    "visual": "name",
-    "collision": "name",
-    "inertial": "",
-    "mass": "value",
-    "inertia": "ixx ixy ixz iyy iyz izz",
-    "parent": "link",
-    "child": "link",
-    "axis": "xyz",
-    "limit": "lower upper effort velocity",
-    "material": "name",
-    "color": "rgba",
-}
-"""Of each element those that the format has: others might scale or turn what they are on, to some reader."""
 
 
 @dataclass(frozen=True)
@@ -113,41 +93,12 @@ def read_robot(path: Path) -> Robot:
             for mimic in element.findall("mimic"):
                 strange += strangers(mimic, "", "joint multiplier offset")
         elif element.tag == "mujoco":
-            strange += _compiler(element)
+            strange += compiler_words(element)
         elif element.tag == "transmission":
-            strange += _transmission(element, {joint.get("name") for joint in root.findall("joint")})
-    strange += _transmissions(root, joints)
-    for element in root.iter():
-        odd = sorted(set(element.attrib) - set(_ATTRIBUTES.get(element.tag, " ".join(element.attrib)).split()))
-        strange += [f"{called(element)}: the format has no attribute {name[:60]} there" for name in odd]
+            strange += transmission_words(element, {joint.get("name") for joint in root.findall("joint")})
+    strange += motor_words(root, [name for name, joint in joints.items() if joint.mimic is None])
+    strange += attribute_words(root)
     return Robot(links, joints, tuple(f"{path.name}: {what}" for what in strange), text)
-
-
-def _compiler(element: Element) -> list[str]:
-    found = list(strangers(element, "compiler", ""))
-    for compiler in element.findall("compiler"):
-        found += strangers(compiler, "", "fusestatic discardvisual strippath")
-    return found
-
-
-def _transmission(element: Element, joints: set[str | None]) -> list[str]:
-    """Return what is wrong with a motor that does not turn one of the joints one to one."""
-    found = list(strangers(element, "type joint actuator", "name"))
-    turned = [joint.get("name") for joint in element.findall("joint")]
-    found += [f"{called(element)} turns joint '{name}', which there is not" for name in turned if name not in joints]
-    for ratio in element.iter("mechanicalReduction"):
-        if (ratio.text or "").strip() not in ("1", "1.0"):
-            found.append(f"{called(element)} reduces by {(ratio.text or 'nothing').strip()[:20]}, not by 1")
-    return found
-
-
-def _transmissions(root: Element, joints: dict[str, Joint]) -> list[str]:
-    """Return which joints have not one motor each, where any has: those that follow no other must."""
-    turned = [joint.get("name") for each in root.findall("transmission") for joint in each.findall("joint")]
-    counts = {name: turned.count(name) for name, joint in joints.items() if joint.mimic is None or name in turned}
-    return [
-        f"joint {name} has {count} transmissions, not one" for name, count in counts.items() if turned and count != 1
-    ]
 
 
 def _read_joint(path: Path, name: str, element: Element) -> Joint:

@@ -369,7 +369,7 @@ def test_two_motors_turn_its_six_joints_and_move_them_in_the_replay(solved: Solv
     begun = coupled(model, hand, 2)
     refined = Continuation(model, hand.contacts, (2,) * model.contacts, hand.active).solve(begun, Margin(), near=True)
     assert refined.exact
-    record = Record(solved.task, None, lambda _: None)
+    record = Record(solved.task.model_copy(update={"motors": 2}), None, lambda _: None)
     adopt(record, model, refined.hand)
     record.design.save(tmp_path)
     verdict = audit_files(tmp_path)
