@@ -222,6 +222,10 @@ HIDDEN: Cases = {
         added(HAND, ".", "<transmission name='t'><joint name='finger9_joint0'/></transmission>"),
         r"turns joint 'finger9_joint0', which there is not",
     ),
+    "a motor for one joint and none for others": (
+        added(HAND, ".", "<transmission name='t'><joint name='finger0_joint0'/></transmission>"),
+        r"joint finger0_joint1 has 0 transmissions, not one",
+    ),
     "a gear": (
         added(
             HAND,
