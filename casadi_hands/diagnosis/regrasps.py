@@ -47,10 +47,9 @@ class Stretch:
 
 def regrasp_findings(task: Task, model: Model) -> Iterator[Finding]:
     """The first touch without room for a fingertip, and the first while in which those that touch hold nothing."""
-    stretches = list(_stretches(model))
+    stretches, wide = list(_stretches(model)), 2 * model.tip_radius
     for each in stretches:
         closest = in_each_other(model, each.points, each.normals)
-        wide = 2 * model.tip_radius
         if closest is not None and closest[2] < APART * wide and (each.new[closest[0]] or each.new[closest[1]]):
             i, j, apart = closest
             what = (
@@ -65,7 +64,7 @@ def regrasp_findings(task: Task, model: Model) -> Iterator[Finding]:
     for each in stretches:
         missing = _missing(model, each)
         if np.linalg.norm(missing) > HELD:
-            who = " and ".join(repr(name) for name in each.names) or "no finger"
+            who = " and ".join(repr(name) for name in each.names)
             what = (
                 f"from {moment(model.schedule, each.start)} on {who} alone cannot hold the object with friction "
                 f"{model.friction:g} (friction), where the task has them touch (fingers.NAME.regrasps): "

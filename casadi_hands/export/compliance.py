@@ -71,12 +71,12 @@ def link_eases(hand: Hand, motion: Motion, motors: Sequence[Motor], moves: bool)
     text = hand_urdf(hand)
     model = pin.buildModelFromXML(text, pin.JointModelFreeFlyer()) if moves else pin.buildModelFromXML(text)
     data, angles, rotors = model.createData(), pin.neutral(model), np.zeros(model.nv)
-    for name, angle, motor in zip(hand.joint_names, _first_angles(hand, motion), motors, strict=True):
+    for name, motor in zip(hand.joint_names, motors, strict=True):
         joint = model.joints[model.getJointId(name)]
-        angles[joint.idx_q], rotors[joint.idx_v] = angle, motor.armature
-    model.armature = rotors
+        angles[joint.idx_q] = motion.joint_angles[0, motion.joint_names.index(name)]
+        rotors[joint.idx_v] = motor.armature
     upper = np.triu(np.reshape(pin.crba(model, data, angles), (model.nv, model.nv)))
-    inertia = upper + np.triu(upper, 1).T
+    inertia = upper + np.triu(upper, 1).T + np.diag(rotors)
     pin.computeJointJacobians(model, data, angles)
     eases = {}
     for name in hand.joint_names:
@@ -85,7 +85,3 @@ def link_eases(hand: Hand, motion: Motion, motors: Sequence[Motor], moves: bool)
         moved = slope[:3] - pin.skew(model.inertias[joint].lever) @ slope[3:]
         eases[name.replace("_joint", "_link")] = float(np.trace(moved @ np.linalg.solve(inertia, moved.T))) / 3
     return eases
-
-
-def _first_angles(hand: Hand, motion: Motion) -> list[float]:
-    return [float(motion.joint_angles[0, motion.joint_names.index(name)]) for name in hand.joint_names]

@@ -9,6 +9,7 @@ from concurrent.futures import Executor
 from contextlib import nullcontext
 from dataclasses import replace
 from functools import cache
+from numbers import Integral
 from pathlib import Path
 
 from casadi_hands.diagnosis.impossible import findings
@@ -86,9 +87,8 @@ def solve(
 
     Raises:
         SolveError: ``until`` is not a stage, or not the last where there is a start; or ``seed`` or ``jobs`` is no such
-            number; or the start is of a task of
-            another structure; or one of ``terms`` cannot be used; or there is nothing to resume; or processes that ran
-            a trial were lost with it.
+            number; or the start is of a task of another structure; or one of ``terms`` cannot be used; or there is
+            nothing to resume; or processes that ran a trial were lost with it.
         DesignError: there is no result in ``start``; or ``out`` cannot be written, is written by another process, or
             holds a result that is certified, or of another task, and is not to be replaced.
         HandsError: MuJoCo, which designs are replayed in, cannot be loaded.
@@ -103,10 +103,10 @@ def solve(
             "only a solve that writes a folder (out), without terms of its own, can be resumed; leave resume out"
         )
     for name, value, least in (("seed", seed, 0), ("jobs", jobs, 1)):
-        if value is not None and not (isinstance(value, int) and value >= least):
+        if value is not None and not (isinstance(value, Integral) and value >= least):
             raise SolveError(f"{name}: given {value!r}; allowed: an integer of at least {least}")
     if seed is not None:
-        task = task.model_copy(update={"search": task.search.model_copy(update={"seed": seed})})
+        task = task.model_copy(update={"search": task.search.model_copy(update={"seed": int(seed)})})
     own_terms = checked(terms)
     if start is not None and task.palm.placed:
         task = stood_like(task, Design.load(start).task)

@@ -66,10 +66,7 @@ def audit(directory: str | Path, *, task: str | Path | None = None, replays: int
     figures = {figure.name: figure for figure in played.figures(None if task is None else load_task(task))}
     # How many drop the object depends on how many are played.
     stated = {name: figure for name, figure in figures.items() if name != "replay_dropped" or replays == TOGETHER}
-    wrong = [
-        *certificate_problems(directory, stated, own, PLAYED),
-        *(replay_problems(directory, played) if own else ()),
-    ]
+    wrong = [*certificate_problems(directory, stated, own, PLAYED), *replay_problems(directory, played)]
     return _with_problems(replace(found, figures={**found.figures, **figures}), wrong)
 
 

@@ -65,6 +65,9 @@ def test_replays_that_are_stated_are_those_that_are_played(good: Scene, tmp_path
         f"replays: result.json says 99 mm off goal {len(goals)}, it is ",
     ):
         assert words in reasons, reasons
+    # A task that is trusted says nothing of replays: these are the folder's all the same.
+    trusted = tmp_path / "falsified" / "task.yaml"
+    assert "99 mm off goal" in "\n".join(audit(tmp_path / "falsified", task=trusted).reasons)
 
 
 def _force_scaled(scene: Scene) -> Scene:

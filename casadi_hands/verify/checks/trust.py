@@ -11,10 +11,8 @@ from casadi_hands.verify.report import UNIT_OF, show
 
 _INTENT = ("about", "name", "search", "weights", "limits", "time_step", "keyframes_between")
 """Sections that say how to look for a design, or what to ask of it, and not what it is."""
-_READ = {
-    *("task.yaml", "hand.urdf", "object.urdf", "scene.xml", "motion.npz", "motion.csv", "result.json"),
-    "meshes",
-}
+_READ = ("task.yaml", "hand.urdf", "object.urdf", "scene.xml", "motion.npz", "motion.csv", "result.json", "meshes")
+"""What the audit reads of a folder."""
 _NAMED = 5
 """Differences, and files, that are named one by one."""
 
